@@ -41,7 +41,7 @@ from hybrid.cli.app import (
     session,
     words,
 )
-from hybrid.cli.console import Console, guard_output, raise_lost_output, span, speed
+from hybrid.cli.console import Console, counted, guard_output, raise_lost_output, span, speed
 
 if TYPE_CHECKING:
     from hybrid.scene.root import Scene
@@ -247,7 +247,7 @@ def import_(
         for text in import_notes(made):
             console.note(text)
         lost = sum(note.kind == "left out" for _, note in notes)
-        console.done(f"{_count(len(files), 'scene')}, {lost} left out", *files, left_out=lost, notes=len(notes))
+        console.done(f"{counted(len(files), 'scene')}, {lost} left out", *files, left_out=lost, notes=len(notes))
 
 
 @app.command()
@@ -260,10 +260,6 @@ def schema(
 
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     print(json.dumps(dialect | (Network if lines else Scene).model_json_schema(), indent=2))
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def _ended(

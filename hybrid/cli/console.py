@@ -55,6 +55,11 @@ def span(seconds: float) -> str:
     return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
+def counted(n: int, what: str) -> str:
+    """A number of things: "1 line", "3 lines"."""
+    return f"{n} {what}{'s' * (n != 1)}"
+
+
 def speed(factor: float) -> str:
     """How many times faster than real time: "40", "3.2", "0.041"."""
     return f"{factor:.0f}" if factor >= 10 else f"{factor:.2g}"
@@ -301,19 +306,10 @@ class Console:
     @contextmanager
     def study(self) -> Iterator[Callable[[StudyProgress], None] | None]:
         """What `hybrid.trade` calls: a bar over all runs, JSON lines, or nothing."""
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
         if self.quiet or self.as_json:
             yield None if self.quiet else self._json_study()
             return
-        columns = (
-            BarColumn(24),
-            MofNCompleteColumn(),
-            TextColumn("{task.description}", markup=False),
-            TimeElapsedColumn(),
-        )
-        # No thread draws it: what is timed would pay for that.
-        with Progress(*columns, console=self._err, transient=True, auto_refresh=False) as bar:
+        with self._bar(auto_refresh=False) as bar:  # no thread draws it: what is timed would pay for that
             task, last = bar.add_task(""), -BAR_EVERY
 
             def show(run: StudyProgress) -> None:
@@ -330,14 +326,11 @@ class Console:
     @contextmanager
     def study_running(self) -> Iterator[Callable[[StudyRunning], None] | None]:
         """What `hybrid.study` calls: a bar over all cases with failures, time left and dask's dashboard; JSON lines."""
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
         if self.quiet or self.as_json:
             yield None if self.quiet else lambda now: self.json("progress", **asdict(now), left=now.left)
             return
-        columns = (BarColumn(24), MofNCompleteColumn(), TextColumn("{task.description}", markup=False))
         shown = self._err.is_terminal  # elsewhere an empty line would be left of it
-        with Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True, disable=not shown) as bar:
+        with self._bar(disable=not shown) as bar:
             task, begun, told = bar.add_task("starting workers"), [-1, 0.0], [0.0]
 
             def show(now: StudyRunning) -> None:
@@ -354,6 +347,12 @@ class Console:
                     self._err.print(", ".join([f"{ended} of {now.total} cases", *parts]), soft_wrap=True)
 
             yield show
+
+    def _bar(self, **how: Any) -> Any:
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+        columns = BarColumn(24), MofNCompleteColumn(), TextColumn("{task.description}", markup=False)
+        return Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True, **how)
 
     def _json_study(self) -> Callable[[StudyProgress], None]:
         last = ""
@@ -398,7 +397,7 @@ class Console:
         names = [str(file) for file in files if file is not None]
         self.json("done", file=names[0], files=names, **facts)
         if not (self.quiet or self.as_json):
-            sys.stdout.write(f"{text} -> {_listed(names)}\n")
+            sys.stdout.write(f"{text} -> {' and '.join(', '.join(names).rsplit(', ', 1))}\n")
 
     def interrupted(self) -> None:
         """What the file holds after Ctrl-C."""
@@ -437,10 +436,6 @@ class Console:
 def _width(stream: TextIO) -> int | None:
     """Columns to write for a file or a pipe, where nobody's window ends; None: those of the terminal."""
     return None if stream.isatty() or "COLUMNS" in os.environ else 200
-
-
-def _listed(names: list[str]) -> str:
-    return " and ".join(", ".join(names).rsplit(", ", 1))
 
 
 def _stamp(file: Path) -> tuple[int, int] | None:

@@ -9,7 +9,7 @@ from math import isfinite
 from textwrap import shorten, wrap
 from typing import TYPE_CHECKING, Any
 
-from hybrid.cli.console import span
+from hybrid.cli.console import counted, span
 from hybrid.kernels.state.report import FORCES
 from hybrid.model.contents import OTHERS, WHERE_NEAR
 from hybrid.model.plan import NetworkPlan, Plan, parts, size_of_result
@@ -53,17 +53,18 @@ def plan_rows(scene: Scene, plan: Plan | NetworkPlan) -> list[str]:
     each = dict(plan.each_line())
     alone, every = each.get(""), list(each.values())
     on = {entry.what: entry.why for line in every for entry in line.contents if entry.on}
+    figured = any(what.startswith("error figure") for what in on)
     rows = _rows_of_lines(scene, each) if alone is None else _rows_of_line(scene, alone, on)
     rows |= {
         "mesh": _mesh(every),
         "payout": _payout(alone),
-        "forces": _forces(on),
+        "forces": ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on),
         "contact": "; ".join(x for x in (_of_lines(scene, on) if alone is None else "", _contact(on)) if x),
         "hockling": _hockling(alone),
         "time": _steps(scene, plan),
         "runs": _runs(max(every, key=lambda x: x.most_runs)),
         "outputs": _outputs(scene),
-        "accuracy": _accuracy(on),
+        "accuracy": on.get("accuracy", "not asked for") + "; no error figure" * (not figured),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
     return [
@@ -85,7 +86,7 @@ def _rows_of_line(scene: Scene, plan: Plan, on: Mapping[str, str]) -> dict[str, 
     """Rows of a line without a name, as far as its model; on: what is on."""
     sections, attached = scene.cable.sections, len(scene.cable.attachments)
     length = sum(section.length for section in sections)
-    line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
+    line = [f"{length:.6g} m", counted(len(sections), "section")] + ([counted(attached, "attachment")] * bool(attached))
     plane = any(what.startswith("computed in a plane") for what in on)
     return {
         "implausible": _noted(plan, "implausible"),
@@ -104,7 +105,7 @@ def _rows_of_lines(system: Any, each: Mapping[str, Plan]) -> dict[str, str]:
     for name, line in each.items():
         joined = system.lines[name]
         length = sum(section.length for section in joined.sections)
-        what = f"{_model(line)}, {_count(sum(line.cells), 'cell')}"
+        what = f"{_model(line)}, {counted(sum(line.cells), 'cell')}"
         what += "".join(f"; {text}" for text in _clamps(system, name))
         if len(each) > MOST_LISTED:
             alike.setdefault(f"{length:.6g} m, {what} each", []).append(name)
@@ -114,7 +115,7 @@ def _rows_of_lines(system: Any, each: Mapping[str, Plan]) -> dict[str, str]:
         rows |= {f"  {name}, payout": _payout(line), f"  {name}, hockling": _hockling(line)}
     groups: dict[str, str] = {}
     for what, names in alike.items():
-        key = _count(len(names), "line")
+        key = counted(len(names), "line")
         while key in groups:
             key += " "  # another row of the same name
         groups[key] = f"{what}: {', '.join(names)}" if len(names) > 1 else f"{what.removesuffix(' each')}: {names[0]}"
@@ -139,10 +140,6 @@ def _table(rows: Mapping[str, str]) -> list[str]:
             break_long_words=False, break_on_hyphens=False,
         )
     ]  # fmt: skip
-
-
-def _forces(on: Mapping[str, str]) -> str:
-    return ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on)
 
 
 def _contact(on: Mapping[str, str]) -> str:
@@ -185,10 +182,6 @@ def _outputs(scene: Scene) -> str:
     return f"{count}, every {every:.4g} s, in a file of some {large}{few * (every * PER_PERIOD > 1.01 * period)}"
 
 
-def _accuracy(on: Mapping[str, str]) -> str:
-    return on.get("accuracy", "not asked for") + ("" if _has(on, "error figure") else "; no error figure")
-
-
 def _clamps(system: Network, name: str) -> list[str]:
     """How the ends of a line are clamped, those that are."""
     found = []
@@ -198,14 +191,6 @@ def _clamps(system: Network, name: str) -> list[str]:
             spring = "" if held.bend_stiffness is None else f" by {held.bend_stiffness:g} N m/rad"
             found.append(f"{end} clamped{spring}{', free to spin' if held.swivel else ''}")
     return found
-
-
-def _has(on: Mapping[str, str], what: str) -> bool:
-    return any(name.startswith(what) for name in on)
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def _model(plan: Plan) -> str:
@@ -230,8 +215,8 @@ def _mesh(plans: Sequence[Plan]) -> str:
     if any(x.base_cells is not None for x in plans):
         base = sum(sum(x.cells) if x.base_cells is None else x.base_cells for x in plans)
         few = f"{base} cells as catenary, " if base < cells else ""
-        return f"{few}{_count(cells, 'cell')} ({unknowns} unknowns) if all is rod"
-    return f"{_count(cells, 'cell')}, {unknowns} unknowns"
+        return f"{few}{counted(cells, 'cell')} ({unknowns} unknowns) if all is rod"
+    return f"{counted(cells, 'cell')}, {unknowns} unknowns"
 
 
 def _payout(plan: Plan | None) -> str:

@@ -22,6 +22,7 @@ from hybrid.cli.tables import (
     extremes_rows,
     quantities_facts,
     search_rows,
+    vector_text,
     verdict_text,
     verdicts_of,
     zones_line,
@@ -61,7 +62,9 @@ def show_motion(console: Console, asked: Any, result: Result, target: Path) -> t
 def show_equilibrium(console: Console, result: Result) -> dict[str, Any]:
     """The same of an equilibrium."""
     lines = _facts_of_lines(result)
-    whole = equilibrium_facts(result) if "" in lines else _search_facts(result)
+    whole = {x: result.attributes[f"static_{x}"] for x in ("path", "residual")}  # how it was found
+    if "" in lines:
+        whole = equilibrium_facts(result)
     rest = _show_lines(console, result, lines, whole)
     errors = _show_errors(console, result)
     console.events(result.events)
@@ -109,11 +112,6 @@ def _show_lines(
         console.show(lambda: "")
     console.show(lambda: Grid(rows))
     return {"points": points, "bodies": bodies, "quantities": held}
-
-
-def _search_facts(result: Result) -> dict[str, Any]:
-    """How the equilibrium of lines was found."""
-    return {x: result.attributes[f"static_{x}"] for x in ("path", "residual")}
 
 
 def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
@@ -212,20 +210,15 @@ def _shown(
 
 
 def _of_point(facts: dict[str, Any]) -> str:
-    turned = f", turned by {_vector(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
-    force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
-    moment = f", moment {_vector(facts['moment'])} N m" if "moment" in facts else ""
-    return f"{_vector(facts['position'])} m{turned}{force}{moment}"
+    turned = f", turned by {vector_text(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
+    force = f", force of the lines {vector_text(facts['force'])} N" if "force" in facts else ""
+    moment = f", moment {vector_text(facts['moment'])} N m" if "moment" in facts else ""
+    return f"{vector_text(facts['position'])} m{turned}{force}{moment}"
 
 
 def _of_body(facts: dict[str, Any]) -> str:
-    turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
-    return f"{turned}, force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
-
-
-def _vector(x: list[float], least: float = 0.0) -> str:
-    zero = max(1e-9 * max(abs(c) for c in x), least)
-    return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
+    turned = f"{vector_text(facts['position'])} m, turned by {vector_text(facts['rotation'], 1e-6)} deg"
+    return f"{turned}, force of the lines {vector_text(facts['force'])} N, moment {vector_text(facts['moment'])} N m"
 
 
 # What `hybrid static --stiffness` and `--offsets` print.

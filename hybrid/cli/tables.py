@@ -161,13 +161,8 @@ def search_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 def ends_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Forces at the ends of a line at rest, what lies on the seabed, its zones and its lowest point."""
-
-    def vector(x: list[float]) -> str:
-        zero = 1e-9 * max(abs(c) for c in x)
-        return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
-
     for end, force in facts["force"].items():
-        yield f"force at {end}", f"{vector(force)} N on the cable"
+        yield f"force at {end}", f"{vector_text(force)} N on the cable"
     if facts.get("grounded_length"):
         a, b = facts["touchdown"]
         yield "on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m"
@@ -178,7 +173,13 @@ def ends_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"uplift at {end}", f"{lift['force']:.5g} N, {lift['angle']:.3g} deg from the seabed"
     if len(facts["zones"]) > 1:
         yield "zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"])
-    yield "lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m"
+    yield "lowest point", f"{vector_text(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m"
+
+
+def vector_text(x: list[float], least: float = 0.0) -> str:
+    """Numbers of a vector, with 0 for round-off, and for what is below `least`."""
+    zero = max(1e-9 * max(abs(c) for c in x), least)
+    return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
 
 
 def zones_over_time(result: Result) -> dict[str, Any]:

@@ -76,20 +76,16 @@ class Series(NamedTuple):
     basis: str
 
 
-class Counted(NamedTuple):
-    """Two tables, cycles and histories, by the names of their columns; the head of both; what to warn of."""
+class Made(NamedTuple):
+    """The content of the files of an export, what to say of it, and what to warn of."""
 
-    head: list[str]
-    cycle_names: list[str]
-    cycles: list[np.ndarray]
-    history_names: list[str]
-    histories: list[np.ndarray]
-    notes: list[str]
-    places: int
+    files: tuple[bytes | memoryview, ...]
+    text: str = ""
+    notes: Sequence[str] = ()
 
 
-def count(chosen: Part) -> Counted:
-    """Cycles in the outputs and steps that were chosen, at the places that matter and those that were asked for.
+def fatigue(chosen: Part) -> Made:
+    """Cycles and histories of outputs and steps, at the places that matter and those that were asked for.
 
     ResultError when there are fewer than three outputs, or rainflow is not installed.
     """
@@ -123,9 +119,10 @@ def count(chosen: Part) -> Counted:
     head += [f"left out: {noise} cycles below {_NOISE:g} of the largest of all places, the solver's tolerance"]
     head += ["not done: stress from tension and curvature, which needs the section; S-N curves; damage"]
     head += [f"{x.quantity} at s = {x.s:.9g} m ({x.place}): {x.basis}" for x in series]
-    return Counted(
-        head, names, [np.array(column) for column in columns], ["t (s)", *names_of], histories, notes, len(places)
-    )
+    head += scene_lines(part)
+    cycles = _table("cycles", head, names, [np.array(column) for column in columns])
+    text = f"{len(rows)} cycles at {len(places)} places; "
+    return Made((cycles, _table("histories", head, ["t (s)", *names_of], histories)), text, notes)
 
 
 # ---- where ----------------------------------------------------------------------------------------
@@ -330,35 +327,19 @@ def export(
     return Exported(tuple(files), made.text + _span(part), (*missing_parts(part), *made.notes))
 
 
-class _Made(NamedTuple):
-    """The content of the files of an export, what to say of it, and what to warn of."""
-
-    files: tuple[bytes | memoryview, ...]
-    text: str = ""
-    notes: Sequence[str] = ()
-
-
-def _csv(part: Part) -> _Made:
+def _csv(part: Part) -> Made:
     columns = histories(part)
     head = head_lines(part) + _span_of_envelope(part) + _errors_of(part) + scene_lines(part)
     rows = len(next(iter(columns.values())))
     text = f"{rows} row{'s' * (rows != 1)}, {len(columns)} columns; "
-    return _Made((_table("histories", head, list(columns), list(columns.values())),), text)
-
-
-def _fatigue(part: Part) -> _Made:
-    found = count(part)
-    head = found.head + scene_lines(part)
-    cycles = _table("cycles", head, found.cycle_names, found.cycles)
-    text = f"{len(found.cycles[0])} cycles at {found.places} places; "
-    return _Made((cycles, _table("histories", head, found.history_names, found.histories)), text, found.notes)
+    return Made((_table("histories", head, list(columns), list(columns.values())),), text)
 
 
 _MADE = {
-    "nc": lambda part: _Made((netcdf(part),)),
+    "nc": lambda part: Made((netcdf(part),)),
     "csv": _csv,
-    "vtkhdf": lambda part: _Made((vtkhdf(part),)),
-    "fatigue": _fatigue,
+    "vtkhdf": lambda part: Made((vtkhdf(part),)),
+    "fatigue": fatigue,
 }
 
 

@@ -30,7 +30,7 @@ from hybrid.view.figure import (
     title_of,
     write_file,
 )
-from hybrid.view.panels import RANGES, only_line
+from hybrid.view.panels import RANGES, end_force, only_line
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import views_of
 from hybrid.view.summary import amount, length_of
@@ -169,7 +169,8 @@ def _shape(results: Mapping[str, Result]) -> Panel:
 def _histories(results: Mapping[str, Result]) -> list[Panel]:
     panels = []
     for end in ("start", "end"):
-        found = {name: force for name, r in results.items() if (force := _end_force(r, end)) is not None}
+        each = {name: end_force(r, end) for name, r in results.items()}
+        found = {name: force for name, force in each.items() if force is not None and len(force[0]) > 1}
         if found:
             panels.append(_over(f"force at the {end}", "N", found, list(results), f"force-{end}"))
     name = "grounded_length"
@@ -177,14 +178,6 @@ def _histories(results: Mapping[str, Result]) -> list[Panel]:
     if known and max(float(y.max()) for _, y in known.values()) > 0.0:
         panels.append(_over("length on the seabed", "m", known, list(results), name))
     return panels
-
-
-def _end_force(result: Result, end: str) -> Curve | None:
-    if f"steps/end_force_{end}" in result and len(result["steps/t"]) > 1:
-        return result["steps/t"], result[f"steps/end_force_{end}"]
-    if f"reaction_{end}" in result and len(result.times) > 1:
-        return result.times, np.linalg.norm(result[f"reaction_{end}"], axis=1)
-    return None
 
 
 def _over(title: str, unit: str, found: Mapping[str, Curve], names: list[str], key: str) -> Panel:

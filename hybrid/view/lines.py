@@ -269,24 +269,11 @@ def largest_tensions(result: Result, every: AllLines) -> Panel:
     return Panel("over-time", "largest tension of each line", Axis("t", "s"), y, items, caption=caption, cursor=True)
 
 
-def motions(result: Result, every: AllLines) -> list[Panel]:
-    """How bodies and points that move leave their first places: one panel for each direction with motion.
+def motions(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
+    """How bodies and points leave their first places: a panel for each direction with motion, and its size, m.
 
     Of less than AT_REST of the longest line it is drawn flat: it is below what a step is solved to.
     """
-    return [panel for _, panel in _shifts(result, every)]
-
-
-def rotations(result: Result, every: AllLines) -> list[Panel]:
-    """How bodies turn from their first attitude: one panel for each of roll, pitch and yaw that moves a fairlead.
-
-    Of less than AT_REST of the longest line, at the fairlead that is farthest from the origin, there is none.
-    """
-    return [panel for _, panel in _turns(result, every)]
-
-
-def _shifts(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
-    """Panels of `motions`, and the largest motion in each, m."""
     named = {f"body {name}": result[f"bodies/{name}/position"] for name in bodies_of(result)}
     held = fairleads_of(result)
     named |= {f"point {x}": result[f"points/{x}/position"] for x in points_of(result) if x not in held}
@@ -308,8 +295,11 @@ def _shifts(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
     return panels
 
 
-def _turns(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
-    """Panels of `rotations`, and the largest way of a fairlead by each of them, m."""
+def rotations(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
+    """How bodies turn from their first attitude: a panel for each angle that moves a fairlead, and by how much, m.
+
+    Of less than AT_REST of the longest line, at the fairlead that is farthest from the origin, there is none.
+    """
     arms, turned = {}, {}
     for name in bodies_of(result):
         arms[f"body {name}"] = float(np.ptp(arms_of(result, name, np.zeros(1, int))[0], axis=0).max())
@@ -370,7 +360,7 @@ def page(result: Result) -> Page:
     panels["p"] = tension_ranges(every) if many else tensions(result, every)
     if every.outputs > 1:
         panels["h"] = largest_tensions(result, every)
-        moved = sorted([*_shifts(result, every), *_turns(result, every)], key=lambda x: -x[0])
+        moved = sorted([*motions(result, every), *rotations(result, every)], key=lambda x: -x[0])
         panels |= dict(zip("mn", [panel for _, panel in moved], strict=False))
     if many:
         return _page_of_many(result, every, views, panels)

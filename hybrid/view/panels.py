@@ -342,12 +342,7 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
 
 def end_forces(result: Result) -> Panel | None:
     """Force at each end at every step, or where the file has none at every output."""
-    found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for end in END_COLOURS:
-        if f"steps/end_force_{end}" in result and len(result["steps/t"]):
-            found[end] = (result["steps/t"], result[f"steps/end_force_{end}"])
-        elif f"reaction_{end}" in result:
-            found[end] = (result.times, np.linalg.norm(result[f"reaction_{end}"], axis=1))
+    found = {end: force for end in END_COLOURS if (force := end_force(result, end)) is not None}
     peak = max((float(y.max()) for _, y in found.values()), default=0.0)
     factor, unit = prefix("N", peak)
     items: list[Item] = []
@@ -361,6 +356,15 @@ def end_forces(result: Result) -> Panel | None:
     y = Axis("force", unit, peak=peak * factor)
     caption = "Force that holds or loads each end, at every step."
     return Panel("end-forces", "end forces", _time(result), y, items, caption=caption, cursor=True) if items else None
+
+
+def end_force(result: Result, end: str) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times (s) and the size of the force at an end, N; None: the file has none."""
+    if f"steps/end_force_{end}" in result and len(result["steps/t"]):
+        return result["steps/t"], result[f"steps/end_force_{end}"]
+    if f"reaction_{end}" in result:
+        return result.times, np.linalg.norm(result[f"reaction_{end}"], axis=1)
+    return None
 
 
 def touchdown(result: Result) -> Panel:

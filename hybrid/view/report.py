@@ -309,7 +309,7 @@ def _panels(result: Result, every: AllLines, shown: dict[str, Kept]) -> dict[str
         found["zones"] = [zone_map(line, next(iter(shown.values())))] if any(line.zones) else []
         found["histories"] = _histories(line)
         found["energy"] = [panel for panel in (energy(line, "energy"), energy(line, "work")) if panel]
-    found["histories"] += [*motions(result, every), *rotations(result, every)]
+    found["histories"] += [panel for _, panel in (*motions(result, every), *rotations(result, every))]
     return found
 
 

@@ -42,7 +42,7 @@ from hybrid.view.figure import (
     write_file,
 )
 from hybrid.view.modes_page import oblique_view
-from hybrid.view.report_parts import footer, packed, page_file, page_of, plotly_script
+from hybrid.view.report_parts import footer, packed, page_file, page_of, plotly_script, table_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -218,13 +218,9 @@ def _ranges(found: Any, results: list[str]) -> str:
         if np.isfinite(values).any():
             worst = found["case"].values[int(np.nanargmax(values))]
             figures = (np.nanmin(values), np.nanmedian(values), np.nanmax(values))
-            cells = "".join(f'<td class="number">{x:.5g}</td>' for x in (*figures, worst))
-            about = escape(str(found[name].attrs.get("long_name", "")))
-            unit = escape(str(found[name].attrs.get("units", "")))
-            rows.append(f"<tr><td>{escape(name)}</td><td>{about}</td><td>{unit}</td>{cells}</tr>")
-    heads = ("", "what it is", "unit", "smallest", "median", "largest", "in case")
-    head = "".join(f'<th scope="col"{" class=number" if k > 2 else ""}>{text}</th>' for k, text in enumerate(heads))
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+            about = (str(found[name].attrs.get(key, "")) for key in ("long_name", "units"))
+            rows.append([name, *about, *(f"{x:.5g}" for x in (*figures, worst))])
+    return table_html(rows, ("", "what it is", "unit", "smallest", "median", "largest", "in case"), numbers=4)
 
 
 def _shares(found: Any) -> str:
@@ -232,18 +228,12 @@ def _shares(found: Any) -> str:
     parts = []
     for name, each in json.loads(found.attrs.get("shares", "{}")).items():
         heads = ("", "derivative", "share", "first order from", "to", "Sobol: first order", "total")
-        head = "".join(f'<th scope="col"{" class=number" if k else ""}>{x}</th>' for k, x in enumerate(heads))
-        rows = ""
-        for row in each["rows"]:
-            numbers = (row[x] for x in ("derivative", "share", "low", "high", "first", "total"))
-            cells = "".join(f'<td class="number">{"" if x != x else f"{x:.4g}"}</td>' for x in numbers)
-            rows += f"<tr><td>{escape(row['variable'])}</td>{cells}</tr>"
+        keys = ("derivative", "share", "low", "high", "first", "total")
+        rows = [[x["variable"], *("" if x[k] != x[k] else f"{x[k]:.4g}" for k in keys)] for x in each["rows"]]
         about = f"R² {each['r2']:.4f} over {each['cases']} cases"
         about = f"No shares: {escape(each['why'])}." if each["why"] else f"{escape(each['of'])} at the mean; {about}."
-        parts.append(
-            f'<h3>{escape(name)}</h3><p class="quiet">{about}</p><div class="scroll"><table><thead><tr>{head}</tr>'
-            f"</thead><tbody>{rows}</tbody></table></div>"
-        )
+        table = table_html(rows, heads, numbers=len(keys))
+        parts.append(f'<h3>{escape(name)}</h3><p class="quiet">{about}</p>{table}')
     if not parts:
         return ""
     return f'<section id="shares"><h2>Shares of the spread, by derivatives</h2>{"".join(parts)}</section>'

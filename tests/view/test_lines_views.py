@@ -100,7 +100,7 @@ def test_motion_below_what_is_resolved_is_drawn_flat(result: hybrid.Result, part
     way = 120.0 * part * np.sin(np.arange(every.outputs))[:, None] * [1.0, 0.0, 0.0]
     still = dict.fromkeys((f"points/{n}/position" for n in points_of(result)), np.zeros((every.outputs, 3)))
     seen = Moved(result, still | {"bodies/spar/position": way})
-    (panel,) = motions(seen, every)  # type: ignore[arg-type]
+    ((_, panel),) = motions(seen, every)  # type: ignore[arg-type]
     (low, high), drawn = panel.limits()[1], next(x.y for x in panel.items if isinstance(x, Line))
     assert ("at rest, to 0.12 mm" in panel.title) == (part < 1e-6)
     assert (np.ptp(drawn) < 1e-3 * (high - low)) == (part < 1e-6)
@@ -112,7 +112,7 @@ def test_what_moves_by_round_off_has_no_curve_beside_what_moves(result: hybrid.R
     names = [f"points/{n}/position" for n in points_of(result)]
     assert len(names) > 1
     shaken = {name: 1e-9 * wave for name in names} | {"bodies/spar/position": 0.5 * wave}
-    (panel,) = motions(Moved(result, shaken), every)  # type: ignore[arg-type]
+    ((_, panel),) = motions(Moved(result, shaken), every)  # type: ignore[arg-type]
     assert [x.label for x in panel.items if isinstance(x, Line) and x.label] == ["body spar"]
 
 
@@ -127,7 +127,7 @@ def test_a_body_that_only_yaws_is_shown_to_yaw(result: hybrid.Result) -> None:
     seen: Any = Moved(result, still | {
         "bodies/spar/position": 3e-3 * wave * [0.0, 0.0, 1.0], "bodies/spar/rotation": [0, 0, 180] + 10.0 * wave * [0, 0, 1],
     })  # fmt: skip
-    (panel,) = rotations(seen, every)
+    ((_, panel),) = rotations(seen, every)
     assert panel.key == "rotation-yaw" and page(seen).panels["m"].title == panel.title
     drawn = next(x.y for x in panel.items if isinstance(x, Line))
     assert np.ptp(drawn) > 19.0 and panel.limits()[1][1] > drawn.max() + 0.2 * np.ptp(drawn)
