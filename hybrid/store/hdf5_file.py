@@ -34,6 +34,7 @@ SLOTS = 31
 # Bytes by which a file in memory grows: by 64 kB, as HDF5 would, one of 12 MB takes 15 ms more.
 GROWTH = 1 << 20
 METADATA = 128 * 1024 * 1024  # bytes: the most that HDF5 takes
+MORE_SPACE = "free some disk space; close programs that hold the file"  # advice
 _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
 
 
@@ -113,9 +114,8 @@ class _Image(h5py.File):
 
 def check_target(path: Path, overwrite: bool) -> None:
     """ResultError if a result cannot be written there."""
+    check_place(path, "run.h5")
     if path.exists():
-        if path.is_dir():
-            raise ResultError(f"{path} is a folder\n    try:      name a file in it, such as {path / 'run.h5'}")
         if not overwrite:
             advice = "another name, or leave --no-overwrite out (overwrite=True in Python)"
             raise ResultError(f"{path} exists\n    try:      {advice}")
@@ -123,6 +123,12 @@ def check_target(path: Path, overwrite: bool) -> None:
             why = "is not a result of hybrid" if os.access(path, os.W_OK) else "is write-protected"
             advice = "another name, or delete the file yourself: only results are replaced, there is no --overwrite"
             raise ResultError(f"{path} exists and {why}\n    try:      {advice}")
+
+
+def check_place(path: Path, example: str) -> None:
+    """ResultError if no file can be there: it is a folder, or in none; example: of a name."""
+    if path.is_dir():
+        raise ResultError(f"{path} is a folder\n    try:      name a file in it, such as {path / example}")
     if not path.parent.is_dir():
         raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
 
@@ -174,8 +180,7 @@ def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False
 
     So an older result survives a failed start, and a reader who has it open keeps what he sees.
     """
-    new = beside(path)
-    try:
+    with replacing(path) as new:
         if isinstance(make, bytes):
             new.write_bytes(make)
         else:
@@ -185,11 +190,6 @@ def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False
         else:
             file = h5py.File(new, "r+", libver=LIBVER, locking="best-effort", rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
         file.swmr_mode = True
-        os.replace(new, path)
-    except OSError as error:
-        raise unwritable(path, error) from error
-    finally:
-        new.unlink(missing_ok=True)
     return file
 
 
@@ -252,6 +252,22 @@ def give_up(file: h5py.File) -> None:
 def beside(path: Path) -> Path:
     """Where a file is made before it takes its place; what a killed process has left there, `locked` removes."""
     return path.with_name(f".{path.name}.{os.getpid()}.new")
+
+
+@contextmanager
+def replacing(path: Path, new: Path | None = None, by_hdf5: bool = False) -> Iterator[Path]:
+    """A name beside a file, `new` or that of `beside`, which takes its place at the end; errors as of `unwritable`."""
+    new = new or beside(path)
+    try:
+        yield new
+        os.replace(new, path)
+    except (OSError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and not by_hdf5:  # which raises either
+            raise
+        raise unwritable(path, error, MORE_SPACE if by_hdf5 else "") from error
+    finally:
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
 
 
 def unwritable(path: Path | None, error: Exception, advice: str = "") -> ResultError:

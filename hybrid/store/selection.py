@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -21,6 +21,7 @@ import numpy as np
 from hybrid.errors import EVENTS_BY_WEIGHT, ResultError, optional_package
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import versions
+from hybrid.store.hdf5_file import check_place, replacing
 from hybrid.store.records import ALIASES, right_of
 from hybrid.store.stored_result import StoredResult
 
@@ -271,30 +272,16 @@ def write_atomically(files: Mapping[Path, bytes | memoryview], overwrite: bool) 
     """
     for path in files:
         check_target(path, overwrite)
-    new = {path: path.with_name(f".{path.name}.{os.getpid()}.new") for path in files}
-    try:
+    with ExitStack() as stack:
         for path, content in files.items():
-            new[path].write_bytes(content)
-        for path in files:
-            os.replace(new[path], path)
-    except OSError as error:
-        advice = "a folder you may write to, with free space; close programs that hold the file"
-        names = " and ".join(map(str, files))
-        raise ResultError(f"{names} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
-    finally:
-        for path in new.values():
-            with suppress(OSError):
-                path.unlink(missing_ok=True)
+            stack.enter_context(replacing(path)).write_bytes(content)
 
 
 def check_target(path: Path, overwrite: bool) -> None:
     """ResultError if nothing can or may be written there."""
+    check_place(path, "run.nc")
     why, advice = "", "another name, or delete the file yourself"
-    if path.is_dir():
-        why, advice = "is a folder", "name a file in it"
-    elif not path.parent.is_dir():
-        raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
-    elif path.exists():
+    if path.exists():
         if not overwrite:
             why, advice = "exists", "another name, or leave --no-overwrite out (overwrite=True in Python)"
         elif not os.access(path, os.W_OK):

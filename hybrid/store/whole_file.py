@@ -41,7 +41,7 @@ from hybrid.store.format import (
     versions,
     write_texts,
 )
-from hybrid.store.hdf5_file import GROUP, TOGETHER, beside, image_of, in_memory, unwritable
+from hybrid.store.hdf5_file import GROUP, TOGETHER, image_of, in_memory, replacing
 from hybrid.store.integrity import Tree, tail_of
 from hybrid.store.recorder import NUMBERS
 
@@ -106,19 +106,13 @@ class LateFile:
         if self.placed:
             return
         self.placed = True
-        new = beside(self.path)
-        try:
+        with replacing(self.path, by_hdf5=True) as new:
             image = image_of(new_file(self.contents, self._restart, self._layout))
             with new.open("wb") as file:
                 file.write(image)
                 file.write(tail_of(len(image), zlib.crc32(image)))
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(new, self.path)
-        except (OSError, RuntimeError) as error:
-            raise unwritable(self.path, error, "free some disk space; close programs that hold the file") from error
-        finally:
-            new.unlink(missing_ok=True)
 
     def may_stay(self) -> bool:
         """Whether the contents may stay in memory, where they are read from; a program may keep thousands of results.

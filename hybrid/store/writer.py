@@ -52,7 +52,6 @@ from hybrid.store.format import (
 )
 from hybrid.store.hdf5_file import (
     GROUP,
-    beside,
     check_target,
     copied,
     created,
@@ -67,6 +66,7 @@ from hybrid.store.hdf5_file import (
     of_all,
     of_part,
     redrafted,
+    replacing,
     root_of,
     unwritable,
 )
@@ -143,17 +143,11 @@ def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], Non
         target.write(image)
         return
     target = target.expanduser().resolve()
-    new = beside(target)  # and then in its place: somebody may be reading
-    try:
+    with replacing(target, by_hdf5=True) as new:  # and then in its place: somebody may be reading
         copy_unsigned(target, new)
         with redrafted(new) as file:
             change(file)
         sign_new(new)
-        os.replace(new, target)
-    except (OSError, RuntimeError) as error:
-        raise unwritable(target, error, "free some disk space; close programs that hold the file") from error
-    finally:
-        new.unlink(missing_ok=True)
 
 
 def _add_to_arrays(contents: ArrayContents, part: Part, done: bool) -> None:

@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.hdf5_file import check_place, replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,10 +45,8 @@ _SEARCHED = 65536  # bytes at the head and at the foot of a file: metadata stand
 def check_target(path: str | Path, formats: Sequence[str], *, overwrite: bool = False) -> Path:
     """The path, if a file of one of the formats (suffixes) may be written there; ResultError says why not."""
     target = Path(path).expanduser()
-    if target.is_dir():
-        raise ResultError(
-            f"{target} is a folder\n    try:      name a file in it, such as {target / 'run'}{formats[0]}"
-        )
+    if target.is_dir() or target.suffix.lower() in formats:
+        check_place(target, f"run{formats[0]}")
     if target.suffix.lower() not in formats:
         names = " or ".join(filter(None, (", ".join(formats[:-1]), formats[-1])))
         advice = f"{target.with_suffix(formats[0]).name}"
@@ -57,8 +55,6 @@ def check_target(path: str | Path, formats: Sequence[str], *, overwrite: bool = 
         raise ResultError(
             f"{target}: unknown file format\n    expected: a name that ends in {names}\n    try:      {advice}"
         )
-    if not target.parent.is_dir():
-        raise ResultError(f"there is no folder {target.parent}\n    try:      mkdir -p {target.parent}")
     if target.exists():
         advice = "another name, or delete the file yourself"
         if not (target.is_file() and os.access(target, os.W_OK)):
@@ -83,16 +79,8 @@ def is_ours(file: Path) -> bool:
 
 def write_file(target: Path, make: Callable[[Path], object]) -> Path:
     """Let `make` write to a name beside the target, then move it there; ResultError where that fails."""
-    new = target.with_name(f".{target.stem}.{os.getpid()}.new{target.suffix}")
-    try:
+    with replacing(target, target.with_name(f".{target.stem}.{os.getpid()}.new{target.suffix}")) as new:
         make(new)
-        os.replace(new, target)
-    except OSError as error:
-        advice = "a folder you may write to, with free space"
-        raise ResultError(f"{target} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
-    finally:
-        with suppress(OSError):
-            new.unlink(missing_ok=True)
     return target
 
 
