@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.cli.console import Console
 from hybrid.cli.tables import lowest_node
+from tests.cli.conftest import Call
 
 WIRE = """\
 title: a wire that swings
@@ -71,33 +68,11 @@ time: {duration: 10, step: 0.1}
 """
 
 
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-    @property
-    def lines(self) -> list[dict]:
-        return [json.loads(line) for line in self.out.splitlines()]
-
-
-Call = Callable[..., Said]
-
-
-@pytest.fixture
-def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Call]:
-    """Run a command in a folder of its own, where wire.yaml and pushed.yaml are."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def folder(call: Call) -> None:
+    """Where wire.yaml and pushed.yaml are."""
     Path("wire.yaml").write_text(WIRE)
     Path("pushed.yaml").write_text(PUSHED)
-
-    def run(*arguments: str) -> Said:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as leaving:
-            main(list(arguments))
-        return Said(leaving.value.code or 0, *capsys.readouterr())
-
-    yield run
 
 
 # ---- 0: done --------------------------------------------------------------------------------------

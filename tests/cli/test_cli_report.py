@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.view import animation as animate
+from tests.cli.conftest import Call
 
 # A wire of two sections, the second thicker: the larger radius holds at the seam.
 SCENE = """\
@@ -31,23 +30,11 @@ time: {duration: 0.1, step: 0.005}
 output: {every: 0.02, points: 5}
 """
 
-Call = Callable[..., tuple[int, str, str]]
 
-
-@pytest.fixture
-def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Call]:
-    """Run a command in a folder of its own, where run.h5 is."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def folder(call: Call) -> None:
+    """Where run.h5 is."""
     hybrid.run(hybrid.parse_scene(SCENE), "run.h5", progress=False)
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as leaving:
-            main(list(arguments))
-        said = capsys.readouterr()
-        return int(leaving.value.code or 0), said.out, said.err
-
-    yield run
 
 
 @pytest.mark.needs("zarr")

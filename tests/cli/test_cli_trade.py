@@ -7,13 +7,11 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
-from hybrid.cli.commands import main
+from tests.cli.conftest import Call
 
 SAG = """\
 title: a line that sags
@@ -34,28 +32,10 @@ SHORT = ["--models", "rod,catenary", "--accuracies", "10%", "--reference", "3%"]
 PATIENCE = 120  # s, for a machine that has to compile the kernels first, and is shared
 
 
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Call = Callable[..., Said]
-
-
-@pytest.fixture
-def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    """Run a command in a folder of its own, where sag.yaml is."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def folder(call: Call) -> None:
+    """Where sag.yaml is."""
     Path("sag.yaml").write_text(SAG)
-
-    def run(*arguments: str) -> Said:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as leaving:
-            main(list(arguments))
-        return Said(leaving.value.code or 0, *capsys.readouterr())
-
-    return run
 
 
 @pytest.mark.long
@@ -79,7 +59,7 @@ def test_trade_writes_into_the_current_folder_and_says_what_to_take(call: Call) 
 def test_json_has_a_line_for_every_row(call: Call) -> None:
     said = call("trade", "sag.yaml", *SHORT, "-o", "out", "--for", "10%", "--json")
     assert said.code == 0, said.err
-    lines = [json.loads(line) for line in said.out.splitlines()]
+    lines = said.lines
     rows = [line for line in lines if line["event"] == "row"]
     with (Path("out") / "trade.csv").open() as file:
         read = list(csv.DictReader(file))
