@@ -23,7 +23,7 @@ from hybrid.view.curves import Kept, Store, even, script_json
 from hybrid.view.figure import ALARM, GREY, INK, short
 from hybrid.view.lines import AllLines
 from hybrid.view.panels import shape
-from hybrid.view.plotly_backend import WIDTH, draw
+from hybrid.view.plotly_backend import NARROW, draw
 from hybrid.view.report_parts import packed, page_file, plotly_script
 from hybrid.view.scenery import scenery
 from hybrid.view.summary import attention, facts_of, length_of
@@ -260,7 +260,7 @@ def card(result: Result) -> str:
     alarms = [f"{fact.title}: {fact.text.splitlines()[0]}" for fact in first if fact.key != "status"]
     alarm = "".join(f'<div style="color:{ALARM}">{escape(_cut(text))}</div>' for text in alarms[:3])
     alarm += f'<div style="color:{ALARM}">and {len(alarms) - 3} more</div>' if len(alarms) > 3 else ""
-    drawing = f'<div style="flex:0 1 {WIDTH:.0f}px;min-width:220px">{picture(result)}</div>' if n else ""
+    drawing = f'<div style="flex:0 1 {NARROW:.0f}px;min-width:220px">{picture(result)}</div>' if n else ""
     title = escape(result.title or "(no title)")
     return (
         f'<div style="{_FRAME}"><div style="font-weight:600;font-size:15px">{title}</div>'

@@ -21,7 +21,7 @@ def test_a_result_shows_itself_with_facts_and_a_picture() -> None:
 def test_the_picture_shows_zones_in_their_colours() -> None:
     drawing = ElementTree.fromstring(picture(reported()))
     space = "{http://www.w3.org/2000/svg}"
-    lines = [x.get("stroke") for x in drawing.iter(f"{space}polyline")]
+    lines = [x.get("stroke") for x in drawing.iter(f"{space}path")]
     assert lines[-3:] == [KIND_COLOURS["catenary"], KIND_COLOURS["rod"], KIND_COLOURS["catenary"]]
     strips = {x.get("fill") for x in drawing.iter(f"{space}rect")}
     assert strips == {KIND_COLOURS["catenary"], KIND_COLOURS["rod"]}

@@ -16,7 +16,7 @@ from reported import reported
 from hybrid.view.curves import kept
 from hybrid.view.figure import Axis, Band, Box, Line, Map, Marks, Panel, Rule, Text
 from hybrid.view.panels import end_forces, ranges
-from hybrid.view.report_parts import draw_graph, png, ticks_of
+from hybrid.view.plotly_backend import draw_graph, png, ticks_of
 from hybrid.view.zones import zone_map
 
 SVG = "{http://www.w3.org/2000/svg}"

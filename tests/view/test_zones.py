@@ -20,8 +20,8 @@ from hybrid.store.reader import Result
 from hybrid.view import zones as zoneplot
 from hybrid.view.figure import Axis, Map, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel
+from hybrid.view.plotly_backend import draw_graph
 from hybrid.view.quantities import plot_zones
-from hybrid.view.report_parts import draw_graph
 from hybrid.view.zones import WHY, rods_at_start, why_rods, zone_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
