@@ -144,8 +144,8 @@ def _identified(found: Identified) -> Any:
     if len(found.estimates) > 1 and (found.correlations == found.correlations).sum() > len(found.estimates):
         each = zip(found.numbers, found.correlations.tolist(), strict=True)
         related = [[name, *(f"{y:.3f}" if y == y else "" for y in row)] for name, row in each]
-        heads = ("", *found.numbers)
-        parts += ["", table_of(heads, related, free=heads, title="correlations")]
+        named = ("", *found.numbers)
+        parts += ["", table_of(named, related, free=named, title="correlations")]
     return Group(*parts, *_ways(found))
 
 
