@@ -18,7 +18,7 @@ from typing import Any
 from hybrid.scene.base import Table
 from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.network import Network
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import CableScene
 
 PAGE = Path(__file__).with_name("scene.md")
 
@@ -541,7 +541,7 @@ def page() -> str:
     """The whole page."""
     order: list[str] = []
     lines = [HEAD]
-    forms: dict[str, type[Table]] = {"Short form of one line": LineScene, "Points and lines": Network}
+    forms: dict[str, type[Table]] = {"Short form of one line": CableScene, "Points and lines": Network}
     for title, schema in ((title, form.model_json_schema()) for title, form in forms.items()):
         tables = schema.pop("$defs")
         known = len(order)

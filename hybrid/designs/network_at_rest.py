@@ -40,7 +40,7 @@ from hybrid.designs.line_at_rest import (
     LineAtRest,
     moment_on_body,
 )
-from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, number_in, with_number
+from hybrid.designs.numbers import OfScene, at_a_bound, number_in, with_number
 from hybrid.designs.wanted import Wanted, parse_wanted
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
@@ -56,11 +56,11 @@ from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, nearby_clamped, same_nodes, seats_know_no_shape, shaped_anew
 from hybrid.model.network import NetworkModel, NetworkResolution, bodies_of, with_surfaces
 from hybrid.model.sections import merged_sections, tension_scale
-from hybrid.scene.analysis import Output
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.network import Network
+from hybrid.scene.network_checks import contradictions_of
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
@@ -305,7 +305,6 @@ class NetworkAtRest(OfScene):
         """run: the equilibrium on cells of resolution; wanted: results, of lines as the scene names them."""
         assert run.found is not None
         self.scene, self._model, self._names = scene, run.model, run.model.names
-        self._outputs = dict[str, Output]()
         self._scenes = {name: self._scene_of(scene, name) for name in self._names}
         of_lines = zip(self._names, run.model.models, strict=True)
         self.places = {name: places_of(model, self._scenes[name]) for name, model in of_lines}
@@ -500,11 +499,8 @@ class NetworkAtRest(OfScene):
         own = {key: q for key, q in system.output.quantities.items() if q.line in (name, None) and q.other is None}
         if not own:
             return scene
-        if name in self._outputs:  # the same table: what else has changed is told by tables
-            return scene.model_copy(update={"output": self._outputs[name]})
         alone = {key: q.model_copy(update={"line": None}) for key, q in own.items()}
-        self._outputs[name] = scene.output.model_copy(update={"quantities": alone})
-        return scene.model_copy(update={"output": self._outputs[name]})
+        return replace(scene, output=scene.output.model_copy(update={"quantities": alone}))
 
     def _key_in(self, key: str) -> str:
         """The key of the network that a key of the scene is."""
@@ -530,7 +526,7 @@ class NetworkAtRest(OfScene):
                 raise at_a_bound(key, number) from None
             both = zip(self._names, changed.lines, self.lines, strict=True)
             others = [name for name, x, line in both if not same_places(x.model, line.model)]
-            if not found and not all(is_allowed_line(scene, name) for name in others):
+            if not found and any(contradictions_of(scene, name) for name in others):
                 fix = "a number that others do not have to match, as lengths of zones have to"
                 raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
             found.append(changed)
@@ -555,9 +551,6 @@ class NetworkAtRest(OfScene):
     def _changed(self, system: Network, key: str) -> _Changed:
         """A changed scene.  How a clamped line is seated may hang on first shapes: then such lines are built anew."""
         anew = [self._hangs_on(system, name) for name in self._names]
-        for new, name in zip(anew, self._names, strict=True):
-            if new:
-                system.know_scene(name, self.scene.scene_of(name))
         built = None
         if self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
             built = with_bodies(self._model, system)

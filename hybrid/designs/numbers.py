@@ -14,7 +14,6 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.base import Invalid, Table, unit_of
-from hybrid.scene.network import Network
 from hybrid.scene.read import read_text, scene_text, text_of
 from hybrid.scene.root import Scene
 from hybrid.scene.yaml_source import Node, Unreadable, from_text
@@ -156,15 +155,6 @@ def allowed(scene: AnyScene) -> AnyScene:
     """A scene that was made by `with_number`; Invalid: it is none that could be read."""
     scene.model_validate(scene.model_dump(mode="python"))
     return scene
-
-
-def is_allowed_line(system: Network, name: str) -> bool:
-    """Whether a line of a network that was made by `with_number` is one that could be read."""
-    try:
-        system.checked_scene(name)
-    except Invalid:
-        return False
-    return True
 
 
 def scene_with(scene: AnyScene, keys: Sequence[tuple[str, ...]], x: Floats) -> AnyScene:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -590,7 +591,7 @@ class NetworkOthers:
             scene = system.scene_of(name, system.carried(name), system.guesses)
             if self._more is not None:
                 output = scene.output.model_copy(update={"points": at_nodes(x.line.s, self._more.get(name, ()))})
-                scene = scene.model_copy(update={"output": output})
+                scene = replace(scene, output=output)
             observer = observer_of(scene, x, True)
             observer = observer.on(line_like(x, self._model.models[l]), x.sea.values, x.zones, x.hinges)
             observer = observer.of(names[name])

@@ -30,7 +30,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from hybrid.live.session import Session
 from hybrid.scene.network import Network
 from hybrid.scene.read import LARGEST_SCENE
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import CableScene
 
 # Bytes of a message: a scene, twice as long in JSON at worst, and what stands around it.
 LARGEST_MESSAGE = 2 * LARGEST_SCENE + 65_536
@@ -191,7 +191,7 @@ def _content(name: str) -> bytes:
 @cache
 def _schemas() -> dict[str, object]:
     """The JSON schemas of the two forms of a scene, for completion and help."""
-    return {"cable": LineScene.model_json_schema(), "lines": Network.model_json_schema()}
+    return {"cable": CableScene.model_json_schema(), "lines": Network.model_json_schema()}
 
 
 def listen(port: int = 0) -> socket.socket:

@@ -221,10 +221,11 @@ def build_system(
     if system.surfaces:
         models = _on_obstacles(system, models, made)
     rides = _leave_own_bodies(system, models)
-    touching = touching_of(system, maker.scenes)
+    scenes = {name: system.scene_of(name) for name in system.lines}
+    touching = touching_of(system, scenes)
     if touching is not None:
         models = _with_contact(system, models, touching)
-    may_meet = that_may_meet(system, maker.scenes)
+    may_meet = that_may_meet(system, scenes)
     models = [_beside_others(x) if k in may_meet else x for k, x in enumerate(models)]
     if _has_drag(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
@@ -240,7 +241,7 @@ def build_system(
     return NetworkModel(
         tuple(system.lines), tuple(models), free, system.rigid, joints, places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
-        maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
+        maker.seats, known, scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
         tuple(_turns_of(x.connections) for x in system.lines.values()), touching, may_meet, rides=rides,
     )  # fmt: skip
 
@@ -451,14 +452,13 @@ class FirstLines:
         self, system: Network, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
         before: NetworkModel | None = None,
     ) -> None:  # fmt: skip
-        """before: a model that was made before, whose seats and scenes hold; None: as the first shapes lie."""
-        seats, scenes = (None, {}) if before is None else (before.seats, before.scenes)
+        """before: a model that was made before, whose seats hold; None: as the first shapes lie."""
+        seats = None if before is None else before.seats
         self._system, self._at, self.bodies, self._rows = system, joined.at, bodies.copy(), joined.rows
         self._given, self._names, self._resolution = seats, list(system.lines), resolution.lines
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
         self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
         self.meshes: dict[str, Any] = {}  # of lines that have one already, as of `Model.mesh`
-        self.scenes = dict(scenes)  # of lines, with their points where the system has them
         self.known: dict[str, KnownMotion] = {}  # motions of bodies, which are added when first asked for
 
     def turn_points(self) -> None:
@@ -503,9 +503,7 @@ class FirstLines:
 
     def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> LineScene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
-        if name not in self.scenes:
-            self.scenes[name] = self._system.scene_of(name)
-        return self._system.scene_of(name, carried, self._at, directions, self.scenes[name])
+        return self._system.scene_of(name, carried, self._at, directions)
 
     def directions(self, name: str, left: Sequence[str] = ()) -> dict[str, Any]:
         """Inertial directions in which the line is clamped, by end; left: points whose axes are not known yet."""

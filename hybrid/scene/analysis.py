@@ -477,6 +477,10 @@ class Output(Table):
 
     @model_validator(mode="after")
     def _points_increase(self) -> Output:
-        if isinstance(self.points, tuple) and not _increasing(self.points):
-            refuse([Finding(("points",), "arc lengths that increase strictly, in m", "sort them and drop duplicates")])
+        places: Any = self.points
+        lines = places.items() if isinstance(places, dict) else [("", places)]  # of several lines by name
+        expected, fix = "arc lengths that increase strictly, in m", "sort them and drop duplicates"
+        for name, x in lines:
+            if isinstance(x, tuple) and not _increasing(x):
+                refuse([Finding(("points", name) if name else ("points",), expected, fix)])
         return self

@@ -1,13 +1,14 @@
 """Several lines that meet at points and bodies: a scene with `points` and `lines` in place of `cable` and `ends`.
 
-What contradicts in it is found by `scene.network_checks`, which checks each line as a scene of its own, between
-the places where its two points are, or are first looked for.
+What contradicts in it is found by `scene.network_checks`, which checks each line by itself too, between the places
+where its two points are, or are first looked for.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import accumulate, combinations, pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
@@ -60,7 +61,7 @@ from hybrid.scene.points import (
     Name,
     Point,
 )
-from hybrid.scene.schema import LineScene, SceneTables
+from hybrid.scene.schema import Asked, LineScene, SceneTables
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -182,7 +183,7 @@ class NetworkOutput(Output):
         return self.points.get(line, DEFAULT_POINTS) if isinstance(self.points, dict) else self.points
 
 
-class Network(SceneTables):
+class Network(SceneTables, Asked):
     """Lines, the points where they end and meet, what acts on them, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {
@@ -412,32 +413,35 @@ class Network(SceneTables):
         )
 
     def scene_of(
-        self, name: str, carrying: Sequence[str] = (), places: Mapping[str, Triple] | None = None,
-        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: LineScene | None = None,
-    ) -> LineScene:  # fmt: skip
-        """A line between the places where its points are, or are first looked for, as a scene of its own.
+        self,
+        name: str,
+        carrying: Sequence[str] = (),
+        places: Mapping[str, Triple] | None = None,
+        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None,
+    ) -> LineScene:
+        """A line between the places where its points are, or are first looked for.
 
         carrying: ends at which the free point is a body of the line, not a place that is held.  places: of the points
-        that are joined [m], wherever they are; None: where the scene has them, and what is wrong with the line is a
-        ValidationError of pydantic.  directions: as of `direction` by end, in place of those.  scene: of the line with
-        its points where the scene has them, if it is known.
+        that are joined [m], wherever they are; None: where the scene has them.  directions: as of `direction` by end,
+        in place of those.
         """
-        if places or directions is not None:  # without places all points are where the scene has them
-            return self._scene_of(name, carrying, places, directions, scene)
         known, key = self._known_scenes, (name, tuple(carrying))
+        if places or directions is not None:  # without places all points are where the scene has them
+            return replace(self.scene_of(name), **self._between_points(name, carrying, places, directions))
         if key not in known:
             known[key] = self._scene_of(name, carrying)
-        return known[key]
+        scene: LineScene = known[key]
+        return scene
 
     @property
     def scenes_of_lines(self) -> dict[str, LineScene]:
-        """Each line with the points that it carries, by name, as a scene of its own."""
+        """Each line with the points that it carries, by name, between points as they are first looked for."""
         guesses = self.guesses
         return {name: self.scene_of(name, self.carried(name), guesses) for name in self.lines}
 
     @property
-    def _known_scenes(self) -> dict[tuple[str, tuple[str, ...]], LineScene]:
-        """Scenes of lines that have been made, by line and ends that carry: to validate one takes 2 ms."""
+    def _known_scenes(self) -> dict[Any, Any]:
+        """Scenes of lines that have been made, by line and ends that carry."""
         tables, known = self._made_scenes
         if any(getattr(self, name) is not table for name, table in tables.items()):  # of what this was copied from
             self.__dict__.pop("_made_scenes")  # older pydantic lets nothing be deleted of what is frozen
@@ -445,16 +449,43 @@ class Network(SceneTables):
         return known
 
     @cached_property
-    def _made_scenes(self) -> tuple[dict[str, Any], dict[tuple[str, tuple[str, ...]], LineScene]]:
+    def _made_scenes(self) -> tuple[dict[str, Any], dict[Any, Any]]:
         """The tables of this system, and `_known_scenes`."""
         return {name: getattr(self, name) for name in type(self).model_fields}, {}
 
-    def _scene_of(
-        self, name: str, carrying: Sequence[str], places: Mapping[str, Triple] | None = None,
-        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: LineScene | None = None,
-        strict: bool = False,
-    ) -> LineScene:  # fmt: skip
-        """As `scene_of`, made anew; strict: an accuracy that is asked for without errors is refused."""
+    def _scene_of(self, name: str, carrying: Sequence[str]) -> LineScene:
+        """As `scene_of`, made anew, with points where the scene has them."""
+        line, output = self.lines[name], self.output
+        kept = Output.model_construct(
+            points=output.points_of(name),
+            history=output.history.get(name),
+            every=self.output_interval if self.time is not None else output.every,
+            criteria=output.criteria and (name in self.adaptive or not self.adaptive),  # none: each says so
+            errors=output.errors,
+        )
+        return LineScene(
+            title=f"{self.title}, line {name}" if self.title else f"line {name}",
+            environment=self.environment,
+            cable=line.cable,
+            contact=self._contact_of(name),
+            obstacles=self.surfaces,
+            model=line.chosen_model,
+            mesh=line.mesh,
+            resolution=line.resolution,
+            time=self.time,
+            output=kept,
+            accuracy=self._accuracy_of(line),
+            **self._between_points(name, carrying),
+        )
+
+    def _between_points(
+        self,
+        name: str,
+        carrying: Sequence[str],
+        places: Mapping[str, Triple] | None = None,
+        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None,
+    ) -> dict[str, Any]:
+        """The ends of a line and its first shape between them; arguments as of `scene_of`."""
         line = self.lines[name]
         first = self._places(line)
         ends: dict[str, End] = {}
@@ -471,7 +502,7 @@ class Network(SceneTables):
                     motion = motion if motion.file is not None else without_turns(motion)
             elif isinstance(body, FixedBody):  # that it turns as well is for the model
                 motion = body.shift
-            elif places is not None:
+            elif places:
                 place = places[getattr(line, key)]
             assert place is not None
             if key in carrying and isinstance(point, FreePoint):
@@ -479,28 +510,7 @@ class Network(SceneTables):
             else:
                 ends[key] = self._held_end(name, key, held, place, motion, carrying)
         initial = _placed(line.initial, first["start"]) if self.starts_as_placed else _between(line.initial, ends)
-        tables: dict[str, Any] = {"ends": Ends(**ends), "initial": initial}
-        if places is not None:
-            return (scene or self.scene_of(name)).model_copy(update=tables)
-        tables |= {
-            "environment": self.environment, "cable": line.cable, "model": line.chosen_model, "mesh": line.mesh,
-            "resolution": line.resolution, "contact": self._contact_of(name), "obstacles": self.surfaces,
-            "accuracy": self._accuracy_of(line),
-        }  # fmt: skip
-        if self.time is not None:
-            tables["time"] = self.time
-        if scene is not None:
-            return scene.model_copy(update=tables)
-        tables["title"] = f"{self.title}, line {name}" if self.title else f"line {name}"
-        given: dict[str, Any] = {"points": self.output.points_of(name), "errors": self.output.errors}
-        given["every"] = self.output_interval if self.time is not None else self.output.every
-        given["history"] = self.output.history.get(name)
-        given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
-        tables["output"] = {key: value for key, value in given.items() if value is not None}
-        late = {}
-        if self.output.errors is False and not (strict and (line.accuracy or self.accuracy)):
-            late["accuracy"] = tables.pop("accuracy")  # that nobody has asked for, or a chosen model has brought along
-        return LineScene.model_validate(tables).model_copy(update=late)
+        return {"ends": Ends(**ends), "initial": initial}
 
     def _held_end(
         self, name: str, key: Literal["start", "end"], held: tuple[Triple, Triple | None] | None, place: Triple,
@@ -540,14 +550,6 @@ class Network(SceneTables):
         own = own.of_lines_in_plane() if self.dimension == 2 else own
         touches = self.contact is not None and any(name in pair for pair in self.touching_pairs)
         return own.beside_others(self.contact.friction) if self.contact is not None and touches else own
-
-    def checked_scene(self, name: str) -> LineScene:
-        """The scene of a line as `scene_of`, checked anew; ValidationError of pydantic: what is wrong with it."""
-        return self._scene_of(name, (), strict=True)
-
-    def know_scene(self, name: str, scene: LineScene) -> None:
-        """Make the scene of a line from that of a system that differs in numbers alone, without checking it again."""
-        self._known_scenes[name, ()] = self._scene_of(name, (), scene=scene)
 
     def _accuracy_of(self, line: JoinedLine) -> Accuracy | None:
         """What is asked of a line: of one that names no model no curvature, because nobody has asked for a rod."""

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, combinations
 from typing import Any
 
-from pydantic import ValidationError
-
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import Finding, Place, nearest
 from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.checks import elevation_has_waves
+from hybrid.scene.checks import contradictions, elevation_has_waves
 from hybrid.scene.combinations import holds_rod, refused, tables_of
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
@@ -23,7 +21,6 @@ from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import ClampedConnection, Fairlead, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.quantities import of_several_lines
-from hybrid.scene.schema import LineScene
 from hybrid.scene.start_checks import SAME_LENGTH
 
 
@@ -192,20 +189,23 @@ def _load_findings(system: Network, ends: Ends | None, line: JoinedLine, at: Pla
         yield Finding(where, found.expected, found.fix, found.given)
 
 
+def contradictions_of(system: Network, name: str, carrying: Sequence[str] = ()) -> list[Finding]:
+    """What contradicts in a line, each under the key that the short form has for it; carrying: as of `scene_of`."""
+    tables = dict(vars(system.scene_of(name, carrying)))
+    if system.output.errors is False:  # nobody has asked for an accuracy, or a chosen model has brought it along
+        tables["accuracy"] = None
+    return contradictions(tables)
+
+
 def _line_findings(system: Network, name: str) -> Iterator[Finding]:
     """What is wrong with a line and its points, each under its own key of the system."""
     wrong: dict[Finding, None] = {}  # each once
     for carrying in ((), *((key,) for key in system.carried(name))):
-        try:
-            scene = system.scene_of(name, carrying)
-            wrong |= dict.fromkeys(motion_findings({key: getattr(scene, key) for key in LineScene.model_fields}))
-        except ValidationError as error:
-            for each in error.errors(include_url=False):
-                at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
-                for found in (each.get("ctx") or {}).get("findings", ()):
-                    if carrying and found.at[:1] == ("initial",):
-                        continue  # of an end that nothing holds: the other lines at its point do
-                    wrong[Finding((*at, *found.at), found.expected, found.fix, found.given)] = None
+        found = contradictions_of(system, name, carrying)
+        if not found:
+            wrong |= dict.fromkeys(motion_findings(vars(system.scene_of(name, carrying))))
+        # of an end that nothing holds the first shape is not judged: the other lines at its point hold it
+        wrong |= dict.fromkeys(x for x in found if not (carrying and x.at[:1] == ("initial",)))
         if wrong:
             break
     yield from (_of_system(system, name, found) for found in wrong)

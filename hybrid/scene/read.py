@@ -23,7 +23,7 @@ from hybrid.scene.checks import contradictions
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.network import Network
 from hybrid.scene.root import Scene, names_lines
-from hybrid.scene.schema import LineScene, SceneTables
+from hybrid.scene.schema import CableScene, LineScene, SceneTables
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_text, override
 
@@ -171,7 +171,7 @@ def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence
     if isinstance(root.value, dict):
         for each in overrides:
             override(root, each, _schema_of(root.plain()))
-    complaints, keys = [], {*LineScene.model_fields, *Network.model_fields}
+    complaints, keys = [], {*CableScene.model_fields, *Network.model_fields}
     for complaint in error.complaints:
         at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
         place = _find(root, at, False)[2] if at and at[0] in keys else None  # an option has no place in the file
@@ -194,14 +194,15 @@ def _from_data(data: Any) -> tuple[Scene, list[RenamedKey]]:
         raise SceneError([Complaint("scene", "nested too deeply", "a scene", fix)]) from None
 
 
-def scene_text(scene: SceneTables) -> str:
-    """The scene as YAML; `parse_scene` reads it back to an equal scene."""
+def scene_text(scene: SceneTables | LineScene) -> str:
+    """The scene as YAML; `parse_scene` reads it back to an equal scene.  A line is written in the short form."""
 
     class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # of C where it was built
         pass
 
     Dumper.add_representer(str, _text_in_yaml)
-    data = scene.model_dump(mode="json", exclude_none=True)
+    tables = CableScene.model_construct(**vars(scene)) if isinstance(scene, LineScene) else scene
+    data = tables.model_dump(mode="json", exclude_none=True)
     style: dict[str, Any] = {"default_flow_style": None, "sort_keys": False, "width": 120, "allow_unicode": True}
     return str(yaml.dump(data, Dumper=Dumper, **style))  # tables in lines, vectors in brackets
 
@@ -262,7 +263,7 @@ def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) ->
         except ValidationError as error:
             schema = _schema_of(data)
             found = [each for one in error.errors(include_url=False) for each in explain(schema, one)]
-            if schema is LineScene:
+            if schema is CableScene:
                 found += [(finding, False) for finding in _of_readable(data)]
     else:
         fix = "begin with tables such as `cable:` and `ends:`"
@@ -275,7 +276,7 @@ def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) ->
 
 def _schema_of(data: Any) -> type[SceneTables]:
     """The tables that a scene has in the form in which it is written."""
-    return Network if names_lines(data) else LineScene
+    return Network if names_lines(data) else CableScene
 
 
 def _of_readable(data: Any) -> Iterator[Finding]:
@@ -287,13 +288,13 @@ def _of_readable(data: Any) -> Iterator[Finding]:
 
 @cache
 def _adapters() -> dict[str, TypeAdapter[Any]]:
-    hints = get_type_hints(LineScene, include_extras=True)
-    return {name: TypeAdapter(hints[name]) for name in LineScene.model_fields}
+    hints = get_type_hints(CableScene, include_extras=True)
+    return {name: TypeAdapter(hints[name]) for name in CableScene.model_fields}
 
 
 def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
     tables: dict[str, Any] = {}
-    for name, field in LineScene.model_fields.items():
+    for name, field in CableScene.model_fields.items():
         if name in data:
             try:
                 tables[name] = _adapters()[name].validate_python(data[name])

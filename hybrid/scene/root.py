@@ -42,9 +42,10 @@ from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import findings_of
 from hybrid.scene.points import ClampedConnection, Connection, Failure, FreePoint, Point
-from hybrid.scene.schema import LineScene, SceneTables, standard_schema
+from hybrid.scene.schema import CableScene, LineScene, standard_schema
 
 LINE = "cable"
+SHORT = "short form"  # under which a scene keeps its tables in that
 ENDS = ("start", "end")
 # Tables of a scene that a line has.
 OF_LINE = ("mesh", "resolution", "contact", "initial")
@@ -136,7 +137,7 @@ class ShortForm:
         return Finding(self.place(found.at), self.text(found.expected), self.text(found.fix), given)
 
 
-def network_tables(scene: LineScene) -> dict[str, Any]:
+def network_tables(scene: CableScene) -> dict[str, Any]:
     """The tables of the network of a cable."""
     made = {name: _point_of(getattr(scene.ends, name)) for name in ENDS}
     line: dict[str, Any] = {name: getattr(scene, name) for name in OF_LINE if getattr(scene, name) is not None}
@@ -151,7 +152,7 @@ def network_tables(scene: LineScene) -> dict[str, Any]:
     return tables | {name: getattr(scene, name) for name in SAME if getattr(scene, name) is not None}
 
 
-def line_of(network: Network) -> LineScene:
+def line_of(network: Network) -> CableScene:
     """The cable of which a network was made."""
     line = network.lines[LINE]
     tables: dict[str, Any] = {name: getattr(line, name) for name in (*OF_LINE, "cable")}
@@ -161,7 +162,7 @@ def line_of(network: Network) -> LineScene:
     kept = {key: getattr(network.output, key) for key in Output.model_fields}
     kept |= {"points": network.output.points_of(LINE), "history": network.output.history.get(LINE)}
     kept["quantities"] = {name: q.model_copy(update={"line": None}) for name, q in kept["quantities"].items()}
-    return LineScene.model_construct(**tables, output=Output.model_construct(**kept))
+    return CableScene.model_construct(**tables, output=Output.model_construct(**kept))
 
 
 def tables_of_cable(update: Mapping[str, Any]) -> dict[str, Any]:
@@ -170,7 +171,7 @@ def tables_of_cable(update: Mapping[str, Any]) -> dict[str, Any]:
     return {key: x for key, x in update.items() if key in own or type(x) in (Output, Contact)}
 
 
-def short_form(scene: LineScene) -> ShortForm:
+def short_form(scene: CableScene) -> ShortForm:
     """Where the keys of the network of a cable are in its scene."""
     pairs: list[tuple[Place, Place]] = [(("lines", LINE), ("cable",))]
     pairs += [(("lines", LINE, name), (name,)) for name in ("model", *OF_LINE)]
@@ -263,17 +264,17 @@ class Scene(Network):
         """A scene of its tables, in either form."""
         line = data
         if isinstance(data, Mapping) and not names_lines(data):
-            line = LineScene.model_validate(data)
-        if not isinstance(line, LineScene):
+            line = CableScene.model_validate(data)
+        if not isinstance(line, CableScene):
             return handler(data)
-        refuse(motion_findings({name: getattr(line, name) for name in LineScene.model_fields}))
+        refuse(motion_findings({name: getattr(line, name) for name in CableScene.model_fields}))
         try:
             scene = handler(network_tables(line))
         except ValidationError as error:
             refuse(_refused(line, error))
             raise
         scene._short = True
-        scene._known_scenes["", ()] = line
+        scene._known_scenes[SHORT] = line
         return scene
 
     @model_validator(mode="after")
@@ -292,27 +293,35 @@ class Scene(Network):
         """The same with other tables, in the form in which it was written or as a network."""
         cable = tables_of_cable(update or {}) if self._short else {}
         made = super().model_copy(update={k: x for k, x in (update or {}).items() if k not in cable}, deep=deep)
-        return self.model_validate(made.asked_scene("").model_copy(update=cable)) if cable else made
+        return self.model_validate(made._as_cable.model_copy(update=cable)) if cable else made
 
     @classmethod
     def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
         """JSON Schema of a scene file, in either form."""
-        refs, found = models_json_schema([(LineScene, "validation"), (Network, "validation")])
+        refs, found = models_json_schema([(CableScene, "validation"), (Network, "validation")])
         keys = {"if": {"anyOf": [{"required": ["lines"]}, {"required": ["points"]}], "not": {"required": ["cable"]}}}
-        forms = {"then": refs[Network, "validation"], "else": refs[LineScene, "validation"]}
+        forms = {"then": refs[Network, "validation"], "else": refs[CableScene, "validation"]}
         return dict(standard_schema(keys | forms | found))
 
     # --- as it was written ----------------------------------------------------------------------
 
     @property
-    def written(self) -> SceneTables:
+    def written(self) -> CableScene | Network:
         """The tables in the form in which it was written."""
-        return self.asked_scene("") if self._short else self
+        return self._as_cable if self._short else self
+
+    @property
+    def _as_cable(self) -> CableScene:
+        """The tables in the short form."""
+        known = self._known_scenes
+        if SHORT not in known:
+            known[SHORT] = line_of(self)
+        return known[SHORT]
 
     @property
     def form(self) -> ShortForm:
         """What keys, lines and places are called where it was written."""
-        return short_form(self.asked_scene("")) if self._short else ShortForm((), {name: name for name in self.lines})
+        return short_form(self._as_cable) if self._short else ShortForm((), {name: name for name in self.lines})
 
     @property
     def asked_lines(self) -> Mapping[str, Any]:
@@ -330,16 +339,16 @@ class Scene(Network):
             return self.scene_of(name)
         known = self._known_scenes
         if ("", ()) not in known:
-            known["", ()] = line_of(self)
+            known["", ()] = LineScene(**dict(self._as_cable))
         return known["", ()]
 
 
 def in_full(scene: Scene) -> Scene:
     """The scene with points and lines, also where it was written as a cable."""
-    return Scene.model_validate(network_tables(scene.asked_scene(""))) if scene.written is not scene else scene
+    return Scene.model_validate(network_tables(scene._as_cable)) if scene._short else scene
 
 
-def _refused(line: LineScene, error: ValidationError) -> Iterator[Finding]:
+def _refused(line: CableScene, error: ValidationError) -> Iterator[Finding]:
     """What the network of a cable refuses, where the cable has it."""
     form = short_form(line)
     for each in error.errors(include_url=False):

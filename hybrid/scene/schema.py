@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field, model_validator
@@ -42,11 +43,8 @@ from hybrid.scene.obstacles import Obstacle, Obstacles
 _STANDARD = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 
 
-class SceneTables(Table):
-    """What a scene and a line of it have in common: a title, the environment, and how densely results are kept."""
-
-    title: Text = Field(default="", description="a line for people; it heads plots and reports")
-    environment: Environment = Field(default=Environment(), description="what acts from outside")
+class Asked:
+    """What is asked of a scene or of one line of it: for how long it is computed, and what is kept."""
 
     if TYPE_CHECKING:  # what each has in its own way
 
@@ -60,11 +58,6 @@ class SceneTables(Table):
         def points_kept(self) -> int: ...
         @property
         def lasting_period(self) -> float: ...
-
-    @classmethod
-    def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
-        """JSON Schema; bounds in the words that editors know."""
-        return dict(standard_schema(super().model_json_schema(*args, **kwargs)))
 
     def require_time(self) -> Time:
         """The `time` table; SceneError if there is none."""
@@ -90,6 +83,18 @@ class SceneTables(Table):
         return max(time.duration / min(wanted, most), time.step or 0.0)
 
 
+class SceneTables(Table):
+    """What both forms of a scene have in common: a title and the environment."""
+
+    title: Text = Field(default="", description="a line for people; it heads plots and reports")
+    environment: Environment = Field(default=Environment(), description="what acts from outside")
+
+    @classmethod
+    def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
+        """JSON Schema; bounds in the words that editors know."""
+        return dict(standard_schema(super().model_json_schema(*args, **kwargs)))
+
+
 def standard_schema(schema: Any) -> Any:
     """A JSON schema whose bounds have their standard names."""
     if isinstance(schema, dict):
@@ -97,8 +102,8 @@ def standard_schema(schema: Any) -> Any:
     return [standard_schema(x) for x in schema] if isinstance(schema, list) else schema
 
 
-# The tables of the short form of a scene, and what the model of each line of a network is made of.
-class LineScene(SceneTables):
+# The tables of the short form of a scene.
+class CableScene(SceneTables):
     """One line without a name, its ends, the world around it, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
@@ -137,6 +142,39 @@ class LineScene(SceneTables):
         "computed in a plane where the whole scene lies in one, for as long as nothing could push it out of it [-]",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_former(cls, value: Any) -> Any:
+        return cls.without_former(value)
+
+    @model_validator(mode="after")
+    def _no_contradiction(self) -> CableScene:
+        refuse(contradictions({name: getattr(self, name) for name in type(self).model_fields}))
+        return self
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineScene(Asked):
+    """One line between the places of its ends, with what surrounds it and what is asked of it.
+
+    What the model of a line is built from: tables of a scene that has been checked, which nothing reads or checks here.
+    """
+
+    title: str
+    environment: Environment
+    cable: Cable
+    contact: Contact  # of the line with itself
+    obstacles: Obstacles  # of all lines
+    ends: Ends  # where its points are, or are first looked for, and how they hold it
+    initial: Initial
+    model: Model
+    mesh: Mesh | None
+    resolution: Resolution | None
+    time: Time | None
+    output: Output  # of this line
+    accuracy: Accuracy | None
+    dimension: Literal[2, 3] | None = None
+
     @property
     def starts_as_placed(self) -> bool:
         """Whether the motion starts where the scene has the line, at rest, and not in equilibrium."""
@@ -161,16 +199,6 @@ class LineScene(SceneTables):
     def lasting_period(self) -> float:
         """The shortest period of waves and motions [s]; infinity: there is none."""
         return lasting_period(moved_in(self.ends, self.obstacles), self.environment)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_former(cls, value: Any) -> Any:
-        return cls.without_former(value)
-
-    @model_validator(mode="after")
-    def _no_contradiction(self) -> LineScene:
-        refuse(contradictions({name: getattr(self, name) for name in type(self).model_fields}))
-        return self
 
 
 # Which obstacles of a scene a line can reach, by its length, its ends and the strain that its sections bear.

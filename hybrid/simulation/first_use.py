@@ -133,7 +133,7 @@ def compile_all(names: Sequence[str]) -> None:
 
     What shares its laws with a solver comes last: by then the process that compiles the solver may have it, too.
     """
-    scene = LineScene.model_validate(SAMPLE)
+    scene = Scene.model_validate(SAMPLE).asked_scene("")
     model = build(scene)
     _compile_by_table(names, *OF_JOINED)
     if ZONES in names or CRITERIA in names:

@@ -16,7 +16,6 @@ from hybrid.model.network import NetworkModel, NetworkResolution, build_system
 from hybrid.model.plan import output_times
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.network import Network
-from hybrid.scene.schema import LineScene
 from hybrid.simulation.floating_watch import FloatingWatch
 from hybrid.simulation.line_result import LineResult, Wanted
 from hybrid.simulation.lone_planes import LonePlanes
@@ -109,7 +108,7 @@ def _at_start(
         start = start_of(system, build_system(system, resolution=resolution), moves, criterion)
     state = NetworkState([x.start for x in start.model.models], start.model.body_places)
     state = (state if start.found is None else start.found.state).copy()
-    scenes = line_scenes(system, start.model)
+    scenes = system.scenes_of_lines
     return First(system, start.model, state, start.found, start.managers, [*scenes.values()], 0, False)
 
 
@@ -119,7 +118,7 @@ def _at_checkpoint(
     """Blank states of the lines of a system, which is loaded as where the checkpoint of a result is."""
     model = build_system(system, resolution=kept_resolution(system, source))
     changed = kept_changes(source, len(changes))
-    scenes = line_scenes(system, model)
+    scenes = system.scenes_of_lines
     managers = managers_for(scenes, model, criterion)  # as at the start, whatever loads came later
     if changed:
         system = changes[changed - 1].scene
@@ -202,15 +201,9 @@ def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, 
             line.diagnostics.begin()
 
 
-def line_scenes(system: Network, model: NetworkModel) -> dict[str, LineScene]:
-    """Scenes of the lines of a system by name, between points as they are first looked for."""
-    guesses, known = system.guesses, model.scenes
-    return {name: system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in model.names}
-
-
 def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
     """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
-    scenes = line_scenes(system, model)
+    scenes = system.scenes_of_lines
     if moves and system.starts_as_placed:
         model, managers = zones_as_placed(scenes, model, criterion)
         return Start(model, None, managers)

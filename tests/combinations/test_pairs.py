@@ -20,7 +20,7 @@ from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.read import _readable_tables, as_scene
 from hybrid.scene.root import LINE, Scene, in_full
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import CableScene
 from tests.combinations.pairs import (
     FEATURES,
     LENGTH,
@@ -73,14 +73,14 @@ def test_every_pair_is_read_or_refused_by_the_table() -> None:
     assert read > 0.9 * len(NAMES)
 
 
-def unchecked(tables: Tables) -> LineScene:
+def unchecked(tables: Tables) -> CableScene:
     """The tables of a scene, each of which can be read, without what contradicts between them."""
-    return LineScene.model_construct(None, **_readable_tables(tables))
+    return CableScene.model_construct(None, **_readable_tables(tables))
 
 
 def refused_as_cable(tables: Tables) -> bool:
     """Whether its tables can be read one by one: what they refuse together is asked of a network, too."""
-    return {*_readable_tables(tables)} == {*LineScene.model_fields}
+    return {*_readable_tables(tables)} == {*CableScene.model_fields}
 
 
 # --- computed ------------------------------------------------------------------------------------

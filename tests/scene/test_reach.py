@@ -35,7 +35,7 @@ HALF_WAY = np.sqrt(56.1**2 - 50.0**2)  # m, as far as the middle of the line com
 
 def test_a_line_reaches_as_far_as_it_may_be_stretched() -> None:
     """Its ellipse, with less than 2 m to spare, its own thickness, and how far ends and obstacles move."""
-    assert longest_stretched(scene().scene_of("")) == pytest.approx(112.2)
+    assert longest_stretched(scene().asked_scene("")) == pytest.approx(112.2)
     assert reaches(scene(HALF_WAY + 1.0))
     assert not reaches(scene(HALF_WAY + 3.0))
     heave = {"motion": {"heave": {"amplitude": 4.0, "period": 9.0}, "ramp": 9.0}}

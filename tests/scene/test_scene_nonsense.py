@@ -18,7 +18,7 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, MEASURED, OCEAN, P
 from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene, parse_scene, validate_scene
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import CableScene
 
 ADAPTIVE = (
     OCEAN.replace(
@@ -399,7 +399,7 @@ def test_nonsense_for_a_list(name: str) -> None:
 
 
 def test_the_texts_of_this_file_have_every_key() -> None:
-    schema = LineScene.model_json_schema()
+    schema = CableScene.model_json_schema()
     known = {key for table in (schema, *schema["$defs"].values()) for key in table["properties"]}
     written = {part for text in TEXTS.values() for path, _ in _places(text) for part in path}
     elsewhere = {

@@ -17,7 +17,7 @@ from hybrid.scene.checks import CHECKS
 from hybrid.scene.ends import Body
 from hybrid.scene.read import RenamedKey, load_scene, parse_scene, read_scene, validate_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import CableScene
 from hybrid.scene.sea import PowerLawCurrent
 from hybrid.scene.wave_theory import JonswapWaves
 
@@ -150,7 +150,7 @@ def _bending() -> dict[str, object]:
 def test_names_of_a_scene_are_those_of_a_scene() -> None:
     """What pydantic has deprecated does not stand among them."""
     names = {name for name in dir(parse_scene(OCEAN)) if not name.startswith("_")}
-    assert set(LineScene.model_fields) | {"length", "require_time", "model_dump"} <= names
+    assert set(CableScene.model_fields) | {"length", "require_time", "model_dump"} <= names
     assert not names & {"copy", "dict", "json", "parse_obj", "parse_raw", "construct", "schema", "validate", "from_orm"}
 
 
@@ -190,7 +190,7 @@ def test_a_key_that_is_no_more(key: str, tmp_path: Path) -> None:
 def test_every_check_asks_for_tables_that_a_scene_has() -> None:
     """A check is skipped where a table of its arguments is missing: one that is misnamed would never run."""
     for check in CHECKS:
-        assert set(signature(check).parameters) <= set(LineScene.model_fields), check.__name__
+        assert set(signature(check).parameters) <= set(CableScene.model_fields), check.__name__
 
 
 def test_there_is_one_solver() -> None:

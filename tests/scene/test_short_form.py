@@ -15,7 +15,7 @@ from hybrid.scene.ends import Ends
 from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.root import LINE, POINTS, Scene, in_full, line_of
-from hybrid.scene.schema import LineScene
+from hybrid.scene.schema import CableScene
 from tests.combinations.pairs import CLAMP, END, FEATURES, START, scene_of
 from tests.problems import tables_with
 
@@ -59,7 +59,7 @@ def test_every_key_of_a_cable_has_its_place() -> None:
     """All tables of a scene and all kinds of ends: a new one has to be given a place here."""
     taken = {"cable", "ends", "output", "model", "mesh", "resolution", "contact", "initial"}
     taken |= {"title", "environment", "obstacles", "time", "accuracy", "dimension"}
-    assert taken == {*LineScene.model_fields}
+    assert taken == {*CableScene.model_fields}
     kinds = {get.__name__.lower() for get in (type(x) for x in _one_of_each_end())}
     assert kinds == {*POINTS}
 

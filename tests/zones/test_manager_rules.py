@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -171,7 +172,7 @@ def test_a_joint_is_passed_where_a_rod_grows_and_not_where_one_appears() -> None
 
 def test_lines_stay_rod_at_clamps_to_what_turns() -> None:
     short = scene({"length": 10.0, "mass": 1.0, "bending_stiffness": 1.0}, pinned(), pinned(9.0, 0, 0), cells=10)
-    what = one_line(short).model_copy(update={"model": AdaptiveModel(kind="adaptive")})
+    what = replace(one_line(short), model=AdaptiveModel(kind="adaptive"))
     built, seats = build(what), np.zeros((1, 2, TURNS + 1))
     seats[0, 1, TURNS] = 1.0
     resolution = SimpleNamespace(lines={"a": first_resolution(what)})
