@@ -13,7 +13,7 @@ from statistics import median
 import numba
 import numpy as np
 import pytest
-from problems import at_rest, suspension
+from problems import StepsOfLine, at_rest, suspension
 from scipy.linalg import solve_banded
 
 import hybrid
@@ -22,7 +22,6 @@ from hybrid.kernels.machine import compiler
 from hybrid.kernels.run.entry import assembly, block_rows
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
-from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
 RUNS = 7
@@ -43,24 +42,24 @@ def moving(zones):
     """A stepper and a state in motion, for timing steps without a driver."""
     model = build(one_line(scene(zones, start="equilibrium")))
     found = at_rest(model, np.inf)
-    stepper = Stepper(model.line, model.length, model.tension_scale)
+    stepper = StepsOfLine(model)
     state = found.state.lines[0].copy()
     state.v[:, 1] = 0.1 * np.sin(0.25 * np.pi * model.line.s)  # no turn at the guide, no speed at the pin
-    stepper.consistent_accelerations(model.sea.at_time(np.inf), model.ends.at_time(np.inf), np.zeros((2, 3)), state)
+    stepper.begin(state)
     return model, stepper, state
 
 
 def cost(zones):
     """Microseconds per cell and iteration, per step, and iterations per step, all included."""
     model, stepper, start = moving(zones)
-    ends, cells = model.ends.at_time(np.inf), model.cells
+    cells = model.cells
     steps = max(2, 20_000 // cells)
     each, iterations = [], 0
     for _ in range(RUNS):
         old, new, iterations = start.copy(), start.copy(), 0
         begin = time.process_time()
         for _ in range(steps):
-            taken = stepper.step(model.sea.at_time(np.inf), ends, old, new, 0.01, 0.5, 0.01)
+            taken = stepper.step(np.inf, old, new, 0.01, 0.5, 0.01)
             iterations += taken.iterations
             old, new = new, old
         each.append(time.process_time() - begin)
@@ -106,9 +105,9 @@ def test_elimination_against_lapack():
         state,
         200.0,
         4e4,
-        stepper.work._replace(rows=rows),
+        stepper.solver.work._replace(rows=rows),
     )
-    W, X, x = stepper.work.W, stepper.work.X, stepper.work.x
+    W, X, x = stepper.solver.work.W, stepper.solver.work.X, stepper.solver.work.x
     blocks = rows.reshape(1001, SIZE, WIDTH)
     low, up = 14, 13
     ab, i = np.zeros((low + up + 1, SIZE * 1001)), np.arange(1001)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from peers.hybrid_touchdown import described
-from problems import at_rest
+from problems import StepsOfLine, at_rest
 
 import hybrid
 from hybrid.kernels.run import entry
@@ -30,7 +30,7 @@ from hybrid.outputs import observed_states
 from hybrid.scene.read import one_line
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stability import seed
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.stepper import MOST_ITERATIONS, REACH, workspace_of
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -163,21 +163,20 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         begin = time.process_time()
         for k in range(1, steps + 1):
             sea, ends, old, new, was, now = model.sea.at_time(0.1 * k), model.ends.at_time(0.1 * k), new, old, now, was
-            task = entry.step_task(0.1, 0.1 * (k > 1), 0.5, stepper.limits, 0.5)
-            outcome, iterations, *_ = entry.step(task, line, sea, ends, States(old, new, was, now), stepper.work)
+            task = entry.step_task(0.1, 0.1 * (k > 1), 0.5, limits, 0.5)
+            outcome, iterations, *_ = entry.step(task, line, sea, ends, States(old, new, was, now), work)
             assert outcome == hybrid.Outcome.OK
             total += iterations
         return time.process_time() - begin, total
 
     scenes = of_duration(4.0), of_duration(12.0)
     model = build(one_line(scenes[1]))
-    sea, ends = model.sea.at_time(0.0), model.ends.at_time(0.0)
-    start = at_rest(model).state.lines[0]
+    ends, start = model.ends.at_time(0.0), at_rest(model).state.lines[0]
     assert model.plane is not None
     line = planar(model.line, model.plane)
     untwist(line, ends, model.cable.held_tangent, start)
-    stepper = Stepper(line, model.length, model.tension_scale)
-    stepper.consistent_accelerations(sea, ends, np.zeros((2, 3)), start)
+    limits, work = entry.Limits(REACH * model.length, model.tension_scale, MOST_ITERATIONS), workspace_of(line)
+    StepsOfLine(model, line).begin(start)
     spent(scenes[0])
     each: dict[str, list[float]] = {"run": [], "solver": [], "watched": []}
     for _ in range(RUNS):

@@ -37,11 +37,13 @@ from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.run.entry import assembly, block_rows, workspace
 from hybrid.kernels.state.report import PLANAR
-from hybrid.kernels.state.state import Ends, State
+from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
+from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest
-from hybrid.solve.stepper import JoinedLine, NetworkState, Stepper
+from hybrid.solve.network_solver import NetworkSolver
+from hybrid.solve.stepper import JoinedLine, NetworkState, NetworkTaken
 from tests.scenes import cable_scene
 
 Floats = NDArray[np.float64]
@@ -121,6 +123,36 @@ def at_rest(model: Model, t: float = 0.0, start: State | None = None) -> LinesAt
     return lines_at_rest(Group([x]), [("the first shape", NetworkState([first]))])
 
 
+STILL = np.zeros((2, 3))  # m/s2, of ends that begin at rest
+
+
+class StepsOfLine:
+    """Steps of one line by itself; its ends and sea are those of a model."""
+
+    def __init__(self, model: Model, line: Line | None = None) -> None:
+        """line: in place of that of the model."""
+        self.model, line = model, model.line if line is None else line
+        sea, ends = model.sea.at_time(0.0), model.ends.at_time(0.0)  # arrays that `at_time` overwrites
+        self.solver = LineSolver(JoinedLine(line, sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1)))
+
+    def begin(self, state: State, accelerations: Floats = STILL) -> NetworkTaken:
+        """Give a state at t = 0 its accelerations and tensions; those of held ends: (2, 3) m/s2."""
+        self._stand_at(0.0)
+        return NetworkSolver(self.solver.lines, 0).consistent_accelerations(NetworkState([state]), [accelerations])
+
+    def step(
+        self, t: float, old: State, new: State, dt: float, rho: float, before: float, rho_before: float | None = None
+    ) -> NetworkTaken:
+        """From `old` to `new`, at t (s), over dt; before, rho_before: the step before, as long, of equal rho."""
+        self._stand_at(t)
+        states = NetworkState([old]), NetworkState([new])
+        return self.solver.step(*states, dt, rho, before, rho if rho_before is None else rho_before)
+
+    def _stand_at(self, t: float) -> None:
+        self.model.sea.at_time(t)
+        self.model.ends.at_time(t)
+
+
 def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State]]:
     """Every step of a scene, without a file: (t, state); the arrays are overwritten two steps later.
 
@@ -128,31 +160,20 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     """
     time = what.require_time()
     model = build(one_line(what))
-    stepper = Stepper(
-        model.line, model.length, model.tension_scale, model.slack_floor if model.slack == "stop" else -np.inf
-    )
+    steps = StepsOfLine(model)
     old = model.start.copy()
     if what.initial.kind == "equilibrium":
         old = at_rest(model).state.lines[0]
     if kick:
         kick(old, model)
-    stepper.consistent_accelerations(
-        model.sea.at_time(0.0), model.ends.at_time(0.0), np.zeros((2, 3)), old
-    )  # held ends start from rest
+    steps.begin(old)
     new = old.copy()
     yield 0.0, old
-    steps = round(time.duration / time.step)
-    for k in range(1, steps + 1):
-        t = k * time.duration / steps
-        taken = stepper.step(
-            model.sea.at_time(t),
-            model.ends.at_time(t),
-            old,
-            new,
-            time.duration / steps,
-            time.rho_inf,
-            time.duration / steps,
-        )
+    count = round(time.duration / time.step)
+    dt = time.duration / count
+    for k in range(1, count + 1):
+        t = k * time.duration / count
+        taken = steps.step(t, old, new, dt, time.rho_inf, dt)
         assert taken.outcome == Outcome.OK, f"{taken} at t = {t}"
         old, new = new, old
         yield t, old

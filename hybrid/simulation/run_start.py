@@ -38,7 +38,7 @@ from hybrid.solve.contact_statics import settled_system, touching_solver
 from hybrid.solve.lines_at_rest import Group, LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import Start, Tally, in_slower_currents, is_in_current
-from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, Stepper, joined_ends
+from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, hold_by_friction, joined_ends
 
 MOST_NODES = 300  # of a line that is looked at for whether it passes through itself
 # Turns by which the link of a line between two clamps may change; and those by which an equilibrium without contact may
@@ -294,8 +294,7 @@ def begin_as_placed(
         refuse_start_in_obstacles(x, one, f"lines.{name}.initial")
         note_drawn(scene, log)
         rotate_ends_in(scene, x, one, log, (joints[0] < 0, joints[1] < 0))
-        stepper = Stepper(x.line, x.length, x.tension_scale)
-        stepper.static_friction(x.sea.at_time(0.0), joined_ends(x.ends.at_time(0.0), joints), one)
+        hold_by_friction(x.line, x.sea.at_time(0.0), joined_ends(x.ends.at_time(0.0), joints), one)
 
 
 def blended_of_lines(system: Network) -> Iterator[tuple[str, str]]:

@@ -11,17 +11,17 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.laws.soil import rest_in_soil
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import Limits
-from hybrid.kernels.state.report import FRICTION, OBSTACLES, RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.run.entry import NO_PUSH, Limits
+from hybrid.kernels.state.report import FRICTION, OBSTACLES, RESIDUAL, RESIDUAL_NODE, USED_RHO
 from hybrid.kernels.state.state import Floats, State
-from hybrid.kernels.step.step import friction_axes
+from hybrid.kernels.step.step import States, friction_axes
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.search import Solution
 from hybrid.solve.stability import DAMPING, Stability, stop
-from hybrid.solve.stepper import JoinedLine, NetworkState, NetworkTaken, Stepper, Taken, workspace_of
+from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
+from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, NetworkTaken, workspace_of
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
-REACH = 0.1  # of the length: largest shift of a node in one iteration
 # An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
 BALANCED, BALANCING = 1e-6, 4
 # Where lines touch Newton goes on once unless this many times the residual balances, too: a ball on lines that lie on
@@ -42,7 +42,6 @@ class LineSolver:
         self.length, self.scale = x.length, x.scale
         self.work, self.anchor = workspace_of(x.line), Stability(x.line, x.sea, x.length, x.scale).anchor
         self.blurred: set[int] = set()
-        self._stepper: Stepper | None = None
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> LineSolver:
         """As of `Solver`."""
@@ -111,12 +110,14 @@ class LineSolver:
 
     def step(
         self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float
-    ) -> Taken:
+    ) -> NetworkTaken:
         """As of `Solver`."""
-        x = self.lines[0]
-        if self._stepper is None:
-            self._stepper = Stepper(x.line, x.length, x.scale)
-        return self._stepper.step(x.sea, x.ends, old.lines[0], new.lines[0], dt, rho, before, rho_before)
+        x, report = self.lines[0], self.work.report
+        task = entry.step_task(dt, before, rho, Limits(REACH * x.length, x.scale, MOST_OF_STEP), rho_before)
+        states = States(old.lines[0], new.lines[0], NO_PUSH, NO_PUSH)
+        outcome, iterations, left, where = entry.step(task, x.line, x.sea, x.ends, states, self.work)
+        taken = NetworkTaken(Outcome(outcome), iterations, left, 0, where, float(report[RESIDUAL]))
+        return replace(taken, rho=float(report[USED_RHO]))
 
     def proof(self, states: NetworkState) -> float:
         """As of `Solver`; infinity when it cannot be told."""

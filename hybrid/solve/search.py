@@ -51,7 +51,7 @@ from hybrid.solve.stability import (
     nudged,
     stop,
 )
-from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, NetworkTaken, Stepper, Taken
+from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, NetworkTaken, hold_by_friction
 
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
@@ -104,7 +104,7 @@ class Solver(Protocol):
 
     def step(
         self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float
-    ) -> NetworkTaken | Taken:
+    ) -> NetworkTaken:
         """A step of dt (s) to `new`, which is overwritten."""
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> Solver:
@@ -199,7 +199,7 @@ def stuck(rough: Solver, lines: Iterable[int], first: NetworkState, shape: str, 
     out = first.copy()
     for k in lines:
         x = rough.lines[k]
-        Stepper(x.line, x.length, x.scale).static_friction(x.sea, x.ends, out.lines[k])
+        hold_by_friction(x.line, x.sea, x.ends, out.lines[k])
     rest, _ = relaxed(rough, out, tally)
     yield Attempt(f"settled with friction from {shape}", *tally.counted(rough.newton(rest)), rough)
 

@@ -19,36 +19,26 @@ from numpy.typing import NDArray
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
-from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.junctions.bodies import STATE
 from hybrid.kernels.junctions.joined_lines import SEAT, TURNS
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.seabed import normal_forces, planes_under
-from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil, soil_at_rest
-from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.laws.soil import soil_at_rest
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
+from hybrid.kernels.run.entry import block_rows, out_of_balance
 from hybrid.kernels.state.report import (
-    FORCE_A,
     FREE,
     FRICTION,
-    LOCAL_ERROR,
-    NET_A,
     PLANAR,
-    RESIDUAL,
     SEABED_ENERGY,
-    SLACKEST,
-    SLACKEST_CELL,
     SOIL,
-    TOUCHES,
-    USED_RHO,
     WAVES,
 )
 from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends
-from hybrid.kernels.step.step import States, friction_axes
+from hybrid.kernels.step.step import friction_axes
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.
@@ -64,19 +54,6 @@ POWERS = (
     "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact",
     "friction", "zones", "obstacles", "hysteresis",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Taken:
-    """How one step went."""
-
-    outcome: Outcome
-    iterations: int  # of Newton's method
-    correction: float  # the next one, as it is predicted, relative
-    where: int  # cell or node where it was worst
-    residual: float  # N, largest force out of balance before the last correction
-    error: float = 0.0  # m, local error
-    rho: float = 0.0  # spectral radius at infinity
 
 
 def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
@@ -108,122 +85,22 @@ def lie_on_bed(line: Line, sea: Sea, work: Work, state: State) -> None:
         grip_obstacles(line, sea, work.u, state, state.grip, state.grip)
 
 
-OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
-
-
-class Stepper:
-    """Takes steps of one line; owns the work arrays, not the state."""
-
-    def __init__(self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf) -> None:
-        self.line = line
-        self.limits = Limits(REACH * length, tension_scale, MOST_ITERATIONS)
-        self.floor = slack_floor  # N; a catenary cell not above it refuses the step
-        self.work = workspace_of(line)
-        self.told: list[float] = self.work.report.tolist()  # the report of the last step or start, as plain numbers
-
-    def step(
-        self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float,
-        rho_before: float | None = None,
-    ) -> Taken:  # fmt: skip
-        """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.
-
-        before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
-        rho_before: its spectral radius, `Taken.rho` of it; that of equal steps where none is given.
-        """
-        task = entry.step_task(dt, before, rho, self.limits, rho if rho_before is None else rho_before)
-        outcome, iterations, left, where = entry.step(
-            task, self.line, sea, ends, States(old, new, NO_PUSH, NO_PUSH), self.work
-        )
-        self.told = told = self.work.report.tolist()
-        if outcome == OK and not told[SLACKEST] > self.floor:
-            outcome, where = Outcome.SLACK, int(told[SLACKEST_CELL])
-        return Taken(OUTCOMES[outcome], iterations, left, where, told[RESIDUAL], told[LOCAL_ERROR], told[USED_RHO])
-
-    def static_friction(self, sea: Sea, ends: Ends, state: State) -> None:
-        """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
-        if not self.line.bits & FRICTION:
-            return
-        state.slip[:] = 0.0
-        still = np.zeros_like(state.r)
-        stretch = np.linalg.norm(state.e, axis=1) / self.line.h - 1.0
-        tension = np.divide(stretch, self.line.ck, out=np.zeros_like(stretch), where=self.line.ck > 0.0)
-        line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
-        rows = block_rows(line)
-        self.work.u[:] = 0.0
-        at_rest = state._replace(vd=still, T=state.T if line.law.size else tension)
-        entry.assembly(line, sea, ends, at_rest, 0.0, HEAVY, self.work._replace(rows=rows))
-        force = out_of_balance(line, rows)
-        force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
-        friction_axes(sea, state.r, state.e, state.slip, state.grip)
-        state.slip[:] = static_friction_travel(self.line, sea, state.r, force)
-
-    def consistent_accelerations(
-        self, sea: Sea, ends: Ends, acceleration: Floats, state: State, force: Floats | None = None,
-        lengthening: Floats | float = 0.0,
-    ) -> Taken:  # fmt: skip
-        """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
-
-        One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
-        the correction is the acceleration; an inextensible cell asks for the change of
-        length that keeps it so, d.(a_{c+1} - a_c) = -|n part of v_{c+1} - v_c|^2 / l.
-        acceleration: (2, 3) m/s2 of the held ends; force: (N+1, 3) N, of contact of the line with itself;
-        lengthening: (N,) m/s2, second rates of the lengths of cells.
-        """
-        state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
-        rest_in_soil(self.line, sea, state.r, state.soil)
-        l = np.linalg.norm(state.e, axis=1)
-        d = state.e / l[:, None]
-        e1 = np.diff(state.v, axis=0)
-        across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
-        gaps = (lengthening - np.einsum("ij,ij->i", across, across) / l) / HEAVY
-        work = self.work
-        work.u[:], work.X[:] = 0.0, 0.0
-        work.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
-        held = ends._replace(position=state.r[[0, -1]])
-        if self.line.bits & WAVES:
-            wave_kinematics(sea, state.r, self.work.u)
-        if self.line.bits & FRICTION:
-            friction_axes(sea, state.r, state.e, state.slip, state.grip)
-        bad = entry.correction(self.line, sea, held, state, 0.0, HEAVY, work._replace(gaps=gaps))
-        if bad >= 0:
-            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(work.report[RESIDUAL]))
-        if force is not None and force.any():
-            b, x = np.zeros_like(work.x), np.zeros_like(work.x)
-            b[:, 1:4] = -force
-            b[np.flatnonzero(ends.held) * (len(b) - 1)] = 0.0
-            solve_again(work.X, work.W, b, x)
-            work.x[:] += x
-        state.vd[:] = HEAVY * work.x[:, 1:4]
-        state.a[:] = state.vd
-        state.T[:] += work.x[1:, 0]
-        turning = (
-            (self.line.spin == 1) & (self.line.polar > 0) & (not self.line.bits & PLANAR)
-        )  # a spin without inertia has no acceleration
-        state.wd[turning] = HEAVY * work.x[:-1, 4][turning]
-        state.wa[:] = state.wd
-        work.u[:] = 0.0
-        entry.assembly(self.line, sea, held, state, 0.0, HEAVY, work)  # once more for the forces that go with them
-        if force is not None:
-            for at in (FORCE_A, NET_A):
-                work.report[at : at + 6] += (force[[0, -1]] * (ends.held[:, None] != 0)).ravel()
-        if self.line.bits & TOUCHES:
-            lie_on_bed(self.line, sea, self.work, state)
-        self.told = self.work.report.tolist()
-        return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
-
-    def evaluate_forces(self, sea: Sea, ends: Ends, state: State) -> None:
-        """The forces and the report of a state as it is, for the books of the step that follows."""
-        self.work.u[:] = 0.0
-        if self.line.bits & WAVES:
-            wave_kinematics(sea, state.r, self.work.u)
-        if self.line.bits & FRICTION:
-            friction_axes(sea, state.r, state.e, state.slip, state.grip)
-        if state.soil.size:
-            lie_in_soil(self.line, sea, state.r, state.soil)
-        entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
-        if self.line.bits & TOUCHES:
-            lie_on_bed(self.line, sea, self.work, state)
-        self.told = self.work.report.tolist()
+def hold_by_friction(line: Line, sea: Sea, ends: Ends, state: State) -> None:
+    """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
+    if not line.bits & FRICTION:
+        return
+    state.slip[:] = 0.0
+    still = np.zeros_like(state.r)
+    stretch = np.linalg.norm(state.e, axis=1) / line.h - 1.0
+    tension = np.divide(stretch, line.ck, out=np.zeros_like(stretch), where=line.ck > 0.0)
+    smooth = line._replace(bits=line.bits & ~(FRICTION | WAVES))
+    rows = block_rows(smooth)
+    at_rest = state._replace(vd=still, T=state.T if line.law.size else tension)
+    entry.assembly(smooth, sea, ends, at_rest, 0.0, HEAVY, workspace_of(line)._replace(rows=rows))
+    force = out_of_balance(smooth, rows)
+    force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
+    friction_axes(sea, state.r, state.e, state.slip, state.grip)
+    state.slip[:] = static_friction_travel(line, sea, state.r, force)
 
 
 # Work arrays of a line; the address of what passes torques through its zones takes a millisecond to find: once.

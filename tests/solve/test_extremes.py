@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 import pytest
-from problems import at_rest
+from problems import StepsOfLine, at_rest
 from scipy.linalg import solve_banded
 
 import hybrid
@@ -19,7 +19,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.run.entry import block_rows, correction
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.stepper import workspace_of
 from tests.scenes import cable_scene, pinned_at
 
 LENGTH, FAR = 1000.0, 1000.0
@@ -61,9 +61,8 @@ def banded(rows, tension):
 
 def disagreement(model, state, cv, ca):
     """March against LAPACK for one Newton system, relative to the largest correction of each kind of unknown."""
-    stepper = Stepper(model.line, model.length, model.tension_scale)
     rows = block_rows(model.line)
-    work = stepper.work._replace(rows=rows)
+    work = workspace_of(model.line)._replace(rows=rows)
     work.u[:] = 0.0
     assert correction(model.line, model.sea.at_time(0.0), model.ends.at_time(0.0), state, cv, ca, work) == -1
     bands, ab, rhs = banded(rows, model.tension_scale)
@@ -101,13 +100,13 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
     assert static < bound
     assert moving < (1e-9 if cells <= 1000 else 1e-8)
 
-    stepper = Stepper(line, model.length, model.tension_scale, model.slack_floor)
+    stepper = StepsOfLine(model)
     state = found.state.lines[0].copy()
     state.v[:, 1] = np.sin(np.pi * line.s / LENGTH)
-    stepper.consistent_accelerations(model.sea.at_time(0.0), model.ends.at_time(0.0), np.zeros((2, 3)), state)
+    stepper.begin(state)
     new = state.copy()
     for _ in range(5):
-        taken = stepper.step(model.sea.at_time(0.0), model.ends.at_time(0.0), state, new, 0.01, 0.5, 0.01)
+        taken = stepper.step(0.0, state, new, 0.01, 0.5, 0.01)
         assert taken.outcome == 0 and taken.iterations <= 4
         state, new = new, state
 
@@ -122,15 +121,15 @@ def test_long_line_at_low_tension(stiffness, tension):
         initial={"kind": "straight", "direction": [1, 0, 0]}, model={"kind": "rod"}, mesh=5000, time=(1.0, 0.01)
     ))  # fmt: skip
     model = build(one_line(scene))
-    stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
+    stepper = StepsOfLine(model)
     state = model.start.copy()
     x = model.line.s / 1000.0
     state.v[:, 1], state.v[:, 2] = np.sin(3 * np.pi * x) * x, 0.3 * np.sin(5 * np.pi * x) * x
-    stepper.consistent_accelerations(model.sea.at_time(0.0), model.ends.at_time(0.0), np.zeros((2, 3)), state)
+    stepper.begin(state)
     new = state.copy()
     most = 0
     for _ in range(50):
-        taken = stepper.step(model.sea.at_time(0.0), model.ends.at_time(0.0), state, new, 0.01, 0.5, 0.01)
+        taken = stepper.step(0.0, state, new, 0.01, 0.5, 0.01)
         assert taken.outcome == 0
         most = max(most, taken.iterations)
         state, new = new, state

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import yaml
+from problems import StepsOfLine
 
 import hybrid
 from hybrid.model.build import build
 from hybrid.scene.read import one_line, read_text, scene_text
-from hybrid.solve.stepper import Stepper
 from tests.said import ONE, both_ways, line_of, said
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
@@ -224,10 +224,10 @@ def test_a_strut_that_is_pushed_beyond_what_it_bears_stops(tmp_path):
 @pytest.mark.parametrize("field", ["e", "v", "T", "a1"])
 def test_a_number_that_is_not_finite_is_found_at_once(field):
     model = build(one_line(scene("rod")))
-    stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
+    steps = StepsOfLine(model)
     old = model.start.copy()
     getattr(old, field)[17] = np.nan
-    taken = stepper.step(model.sea.at_time(0.0), model.ends.at_time(0.0), old, old.copy(), 0.01, 0.5, 0.0)
+    taken = steps.step(0.0, old, old.copy(), 0.01, 0.5, 0.0)
     assert taken.outcome in (hybrid.Outcome.NOT_FINITE, hybrid.Outcome.TURNED_TOO_FAR)
     assert taken.iterations <= 1
 

@@ -18,8 +18,9 @@ from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
 from hybrid.simulation.new_run import new_run
 from hybrid.simulation.run import Run
+from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.stepper import JoinedLine, NetworkState, Stepper, joined_ends
+from hybrid.solve.stepper import JoinedLine, NetworkState, joined_ends
 from tests.scenes import line_between, network_scene
 
 LENGTH, CELLS = 100.0, 40
@@ -62,6 +63,8 @@ class Cut:
             lines.append(JoinedLine(model.line, model.sea.at_time(np.inf), held, model.length, scale, -np.inf, joints))
             self.start.append(model.start)
         self.solver = NetworkSolver(lines, len(cuts))
+        whole = JoinedLine(self.line, self.sea, self.ends, LENGTH, self.whole.tension_scale, -np.inf, (-1, -1))
+        self.in_one, self.accelerations = LineSolver(whole), NetworkSolver([whole], 0).consistent_accelerations
 
     def apart(self, states: Sequence[Any], name: str, state: Any) -> float:
         """Largest difference of an array of nodes or cells from that of the line in one piece."""
@@ -91,14 +94,13 @@ def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], fli
     assert cut.apart(states, "r", cut.state) < 1e-9 * LENGTH
     assert cut.apart(states, "T", cut.state) < 1e-9 * cut.state.T.max()
 
-    stepper = Stepper(cut.line, LENGTH, cut.whole.tension_scale)
     old, others = cut.state.copy(), found.copy()
-    assert stepper.consistent_accelerations(cut.sea, cut.ends, np.zeros((2, 3)), old).outcome == Outcome.OK
+    assert cut.accelerations(NetworkState([old]), [np.zeros((2, 3))]).outcome == Outcome.OK
     assert cut.solver.consistent_accelerations(found, [np.zeros((2, 3))] * len(flips)).outcome == Outcome.OK
     new, dt, before, iterations = old.copy(), 0.05, 0.0, [0, 0]
     for k in range(1, 81):
         cut.move(B + np.array([0.1, 0.0, 0.3]) * (1.0 - np.cos(2.0 * np.pi * k * dt / 3.0)))
-        one = stepper.step(cut.sea, cut.ends, old, new, dt, 0.8, before)
+        one = cut.in_one.step(NetworkState([old]), NetworkState([new]), dt, 0.8, before, 0.8)
         many = cut.solver.step(found, others, dt, 0.8, before, 0.8)
         assert one.outcome == many.outcome == Outcome.OK
         old, new, found, others, before = new, old, others, found, dt
@@ -121,9 +123,7 @@ def test_what_consistent_accelerations_are() -> None:
         nodes = slice(cut.edges[i], cut.edges[i + 1] + 1)
         each.r[:], each.v[:] = state.r[nodes], state.v[nodes]
         each.e[:], each.T[:] = state.e[nodes][: each.T.size], state.T[nodes][: each.T.size]
-    Stepper(cut.line, LENGTH, cut.whole.tension_scale).consistent_accelerations(
-        cut.sea, cut.ends, np.zeros((2, 3)), state
-    )
+    cut.accelerations(NetworkState([state]), [np.zeros((2, 3))])
     cut.solver.consistent_accelerations(found, [np.zeros((2, 3))] * 2)
     assert np.abs(state.vd).max() > 0.1
     assert cut.apart(states, "vd", state) < 1e-9 * np.abs(state.vd).max()

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from problems import at_rest
+from problems import StepsOfLine, at_rest
 from test_time_order import scene
 
 import hybrid
@@ -16,7 +16,6 @@ from hybrid.kernels.step.step_control import before_fixed, end_of_try, halve, no
 from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
-from hybrid.solve.stepper import Stepper
 from tests.scenes import cable_scene, pinned_at
 
 DURATION = 2.0  # s
@@ -33,18 +32,13 @@ def motion(model, rho, steps, carried=True):
     """Times, positions and tensions at the end of every step; steps: s; carried: whether the scheme is told of them."""
     what = scene(model, 0.01, rho)
     made = build(one_line(what))
-    stepper = Stepper(made.line, made.length, made.tension_scale)
-    old = at_rest(made).state.lines[0]
-    stepper.consistent_accelerations(
-        made.sea.at_time(0.0), made.ends.at_time(0.0), made.ends.acceleration(0.0, 1e-5), old
-    )
+    stepper, old = StepsOfLine(made), at_rest(made).state.lines[0]
+    stepper.begin(old, made.ends.acceleration(0.0, 1e-5))
     new = old.copy()
     t, before, radius, out = 0.0, 0.0, rho, {}
     for dt in steps:
         t += dt
-        taken = stepper.step(
-            made.sea.at_time(t), made.ends.at_time(t), old, new, dt, rho, *((before, radius) if carried else (dt, rho))
-        )
+        taken = stepper.step(t, old, new, dt, rho, *((before, radius) if carried else (dt, rho)))
         assert taken.outcome == Outcome.OK, f"{taken.outcome} at t = {t}"
         old, new, before, radius = new, old, dt, taken.rho
         out[round(t, 9)] = (old.r.copy(), old.T.copy())
