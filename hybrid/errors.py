@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 
 class HybridError(Exception):
@@ -54,6 +54,11 @@ class SceneError(HybridError):
         self.complaints = complaints
         self.file = file
         super().__init__("\n".join(c.text(file) for c in complaints))
+
+
+def refuse_value(where: str, given: str, expected: str, fix: str) -> NoReturn:
+    """Refuse one value of a scene: its key, what it is, what was expected, what to try."""
+    raise SceneError([Complaint(where, given, expected, fix)])
 
 
 class ResultError(HybridError):

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import refuse_value
 from hybrid.kernels.mesh.cell_lengths import COMPRESSED_SHARE, FLANK, SHARP
 from hybrid.kernels.state.report import OBSTACLES, PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, State
@@ -42,8 +42,9 @@ from hybrid.model.obstacles import kind_of, least_cells, obstacle_bits
 from hybrid.model.payout import PayoutPlan, cable_of, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.sea import Surroundings, bed_bits, surroundings
-from hybrid.model.sections import merged_sections, stiffeners_of, tension_scale
+from hybrid.model.sections import attached, merged_sections, tension_scale
 from hybrid.scene.analysis import AdaptiveModel, RodModel, RodZone, ZonesModel
+from hybrid.scene.attachments import BendStiffener
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.schema import LineScene, reachable_obstacles
@@ -79,7 +80,7 @@ def in_plane(
         if asked:
             fix = "give `initial` a shape or a direction in the plane, or write `dimension: 3`"
             expected = f"a first shape in {found.text()}, which the rest of the scene lies in"
-            raise SceneError([Complaint("initial", "one that leaves the plane", expected, fix)])
+            refuse_value("initial", "one that leaves the plane", expected, fix)
         return None, Entry(WHAT, False, f"the first shape leaves {found.text()}")
     if asked:
         others[:] = [(name, x) for name, x in others if _lies_in(plane, x, ends, tolerance)]
@@ -271,7 +272,7 @@ def build(
     cable = cable_of(scene)
     resolution = resolution or first_resolution(scene)
     layout, s, zones = place_cells(scene, cable, resolution, mesh)
-    if stiffeners_of(scene):
+    if attached(scene, BendStiffener):
         cable = cable_of(scene, s if layout is None else layout.base)
     paid = None
     to_compare = payout_of(scene) is not None and resolution.fineness < first_resolution(scene).fineness
@@ -357,7 +358,7 @@ def _knots(scene: LineScene, plans: Sequence[ZonePlan], cuts: Sequence[float]) -
 
 def places_of(model: Model, scene: LineScene) -> tuple[float, ...]:
     """`Resolution.places` of the cells of a model; empty where what else makes them goes by no places."""
-    if stiffeners_of(scene) or payout_of(scene) is not None or follows_curvature(scene):
+    if attached(scene, BendStiffener) or payout_of(scene) is not None or follows_curvature(scene):
         return ()
     nodes = model.line.s if model.layout is None else model.layout.base
     plans = zone_plans(scene) if model.layout is None else (ZonePlan("rod", scene.length),)
@@ -450,7 +451,7 @@ def _placed(
 
 def _dense_in_stiffeners(scene: LineScene, s: Floats, fineness: float) -> Floats:
     """Nodes (N+1,) m with evenly split cells where stiffeners have fewer than they need."""
-    stiffeners = stiffeners_of(scene)
+    stiffeners = attached(scene, BendStiffener)
     if not stiffeners:
         return s
     middle, h = 0.5 * (s[:-1] + s[1:]), np.diff(s)
@@ -536,14 +537,8 @@ def _rods_in(zones: Sequence[Zone], s: Floats) -> NDArray[np.bool_]:
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
     for k, zone in enumerate(zones):
         if zone.kind == "rod" and int((zone_of == k).sum()) < 2:
-            raise SceneError(
-                [
-                    Complaint(
-                        f"model.zones[{k}]",
-                        f"a rod of {zone.s_b - zone.s_a:g} m with one cell",
-                        "at least two cells: a rod bends at the nodes between its cells",
-                        "give the zone `cells: 2` or more, or make mesh.cells larger",
-                    )
-                ]
-            )
+            given = f"a rod of {zone.s_b - zone.s_a:g} m with one cell"
+            expected = "at least two cells: a rod bends at the nodes between its cells"
+            fix = "give the zone `cells: 2` or more, or make mesh.cells larger"
+            refuse_value(f"model.zones[{k}]", given, expected, fix)
     return np.array([z.kind == "rod" for z in zones])[zone_of]

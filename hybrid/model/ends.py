@@ -396,7 +396,7 @@ class EndConditions:
             if k not in self.motions:
                 self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
             if part < 1.0:
-                back = _rotation(axis, -angle * (1.0 - part))
+                back = rotation(-angle * (1.0 - part) * axis)
                 self.values.frame[k] = (back @ self.values.frame[k].reshape(3, 3)).ravel()
                 self.values.spin[k] = back @ self.values.spin[k] + axis * angle * rate
 
@@ -407,12 +407,6 @@ def rise(t: float, duration: float) -> tuple[float, float]:
         return 1.0, 0.0
     x = min(max(t / duration, 0.0), 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * (1.0 - x) ** 2 / duration
-
-
-def _rotation(axis: Floats, angle: float) -> Floats:
-    """Rotation matrix (3, 3) about a unit axis."""
-    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
 
 
 # An end that is set from outside, step by step: where it is to be at the end of the next step, and the way there.

@@ -105,7 +105,9 @@ def unclamped(model: Model, k: int) -> Model:
         held_twist=(twist[0] and k != 0, twist[1] and k != 1),
         hinged=(hinged[0] or k == 0, hinged[1] or k == 1),
     )
-    line, on_base = without_torque(without_clamp(model.line, -k)), None
+    line, on_base = without_clamp(model.line, -k), None
+    if line.torsion.size:  # a torque passes where both ends hold the twist
+        line = line._replace(torsion=NO_TORSION)
     if model.layout is not None:
         line, on_base = with_spin_inertia(line, cable), LineOnBase(cable, model.layout.base)
     return replace(model, line=line, cable=cable, on_base=on_base)
@@ -118,8 +120,3 @@ def without_clamp(line: Line, node: int) -> Line:
     element, kb, k0, hn = line.element.copy(), line.kb.copy(), line.k0.copy(), line.hn.copy()
     element[node], kb[node], k0[node], hn[node] = 0, 0.0, 0.0, 0.5 * abs(line.s[node] - line.s[-2 if node else 1])
     return line._replace(element=element, kb=kb, k0=k0, hn=hn)
-
-
-def without_torque(line: Line) -> Line:
-    """The line without catenary zones that a torque passes through: it passes where both ends hold the twist."""
-    return line._replace(torsion=NO_TORSION) if line.torsion.size else line

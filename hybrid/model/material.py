@@ -28,20 +28,18 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import Floats
 from hybrid.model.sections import (
+    attached,
     attachments_at,
     bending_stiffness,
     damping,
     mean_compliance,
     merged_sections,
-    modules_of,
     pressing,
-    restrictors_of,
     rotary_inertia,
-    stiffeners_of,
     swivels,
     torsional_stiffness,
 )
-from hybrid.scene.attachments import BendRestrictor, BendStiffener
+from hybrid.scene.attachments import BendRestrictor, BendStiffener, Modules, Spread
 from hybrid.scene.cable import Section, Vortices
 from hybrid.scene.schema import LineScene
 from hybrid.scene.section_laws import Curve, Layer, slopes, stiffened
@@ -244,9 +242,10 @@ def material(scene: LineScene, nodes: Floats | None = None) -> Material:
     sections = merged_sections(scene.cable.sections)
     ends = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
     length, near = float(ends[-1]), 1e-9 * float(ends[-1])
-    modules, stiffeners, restrictors = list(modules_of(scene)), stiffeners_of(scene), restrictors_of(scene)
-    edges = _apart([*ends.tolist(), *(x for m in (*modules, *stiffeners, *restrictors) for x in m.range)], length, near)
-    bounds = _apart([*edges, *(x for m in stiffeners for x in _pieces_of(m, nodes, length))], length, near)
+    modules, restrictors = attached(scene, Modules), attached(scene, BendRestrictor)
+    edges = _apart([*ends.tolist(), *(x for m in attached(scene, Spread) for x in m.range)], length, near)
+    pieces = (x for m in attached(scene, BendStiffener) for x in _pieces_of(m, nodes, length))
+    bounds = _apart([*edges, *pieces], length, near)
     middle = 0.5 * (np.array(bounds[:-1]) + np.array(bounds[1:]))
     of = [sections[int(i)] for i in np.clip(np.searchsorted(ends, middle) - 1, 0, len(sections) - 1)]
     out = _bare(scene, np.array(bounds), of)
@@ -286,7 +285,7 @@ def _pieces_of(stiffener: BendStiffener, nodes: Floats | None, length: float) ->
 
 def _stiffen(out: Material, scene: LineScene, middle: Floats) -> None:
     """Bending stiffness, mass and rotary inertia of stiffeners on pieces with their middles (K,) m."""
-    for x in stiffeners_of(scene):
+    for x in attached(scene, BendStiffener):
         for k in np.flatnonzero((middle > x.range[0]) & (middle < x.range[1])):
             s, density = float(middle[k]), x.density or 0.0
             out.B[k, :2] += x.stiffness(_stiff_at(x, out.bounds[k], out.bounds[k + 1]))
@@ -405,12 +404,12 @@ def _wetted(out: Material, scene: LineScene, of: list[Section], middle: Floats) 
     rho = fluid.density
     width = out.outer_diameter.copy()
     volume, area, extra = 0.25 * np.pi * width**2, np.zeros(len(of)), np.zeros(len(of))
-    for x in stiffeners_of(scene):
+    for x in attached(scene, BendStiffener):
         for k in np.flatnonzero((middle > x.range[0]) & (middle < x.range[1])):
             width[k] = max(width[k], x.outer(float(middle[k])))
             volume[k] += x.area(float(middle[k])) if x.density is not None else 0.0
     disc = 0.25 * np.pi * width**2
-    for m in modules_of(scene):
+    for m in attached(scene, Modules):
         on = (middle > m.range[0]) & (middle < m.range[1])
         volume[on] += m.volume_in(rho, gravity)
         area[on] += m.drag_area
@@ -487,8 +486,6 @@ def _points(out: Material, scene: LineScene) -> None:
 
 def _nearest(places: Floats, wanted: list[float]) -> list[int]:
     """Of `places` (P,), rising, that which is nearest to each of those wanted; the first of two as near."""
-    if not wanted:
-        return []
     if not wanted:
         return []
     x = np.array(wanted, float)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import refuse_value
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.remesh import Cable, blank_kinds_job, blank_line_job, fill_kinds
 from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
@@ -90,17 +90,10 @@ def place_nodes(
         counts = [p.cells or 0 for p in plans]
         left = cells - sum(counts)
         if left < 2 * len(open_zones) or (not open_zones and left != 0):
-            raise SceneError(
-                [
-                    Complaint(
-                        "mesh.cells",
-                        str(cells),
-                        f"what the zones ask for ({sum(counts)}) and at least two for each of the other "
-                        f"{len(open_zones)} zones",
-                        "leave mesh.cells out, or leave `cells` out of one zone",
-                    )
-                ]
-            )
+            least = f"at least two for each of the other {len(open_zones)} zones"
+            expected = f"what the zones ask for ({sum(counts)}) and {least}"
+            fix = "leave mesh.cells out, or leave `cells` out of one zone"
+            refuse_value("mesh.cells", str(cells), expected, fix)
         rest = share(left, [p.length for p in open_zones]) if open_zones else []
     it = iter(rest)
     counts = [c or next(it) for c in counts]
@@ -170,16 +163,9 @@ def given_nodes(
     for x in [*bounds, *cuts]:
         i = int(np.argmin(np.abs(s - x)))
         if abs(s[i] - x) > 1e-9 * s[-1]:
-            raise SceneError(
-                [
-                    Complaint(
-                        "mesh.nodes",
-                        f"nearest node to {x:g} m is {s[i]:g} m",
-                        f"a node at {x:g} m, where a zone, a section, modules or an attachment begin",
-                        f"add {x:g} to the list",
-                    )
-                ]
-            )
+            expected = f"a node at {x:g} m, where a zone, a section, modules or an attachment begin"
+            given = f"nearest node to {x:g} m is {s[i]:g} m"
+            refuse_value("mesh.nodes", given, expected, f"add {x:g} to the list")
         s[i] = x
     return s, tuple(Zone(p.kind, a, b) for p, (a, b) in zip(plans, pairwise(bounds.tolist()), strict=True))
 
@@ -188,7 +174,7 @@ def refuse_too_many(cells: int) -> None:
     """SceneError before anything of that size is allocated."""
     if cells > MOST_CELLS:
         expected = f"at most {MOST_CELLS} cells: a line has never needed more, and memory would"
-        raise SceneError([Complaint("mesh.cells", str(cells), expected, "grade the mesh with `ratio` instead")])
+        refuse_value("mesh.cells", str(cells), expected, "grade the mesh with `ratio` instead")
 
 
 # Where cells should be short: a density of cells along the cable, from how it bent in an earlier run.

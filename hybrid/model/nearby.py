@@ -28,9 +28,9 @@ from hybrid.model.network import NetworkResolution, build_system, first_lines
 from hybrid.model.obstacles import obstacle_bits
 from hybrid.model.resolution import Resolution
 from hybrid.model.sea import Surroundings, surroundings
-from hybrid.model.sections import stiffeners_of
+from hybrid.model.sections import attached
+from hybrid.scene.attachments import BendStiffener
 from hybrid.scene.bodies import FixedBody
-from hybrid.scene.ends import Pinned
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 
@@ -53,17 +53,12 @@ def nearby(
     reaches_more = bool(obstacle_bits(scene) & ~(model.line.bits | without))
     if model.payout is not None or reaches_more or (_turned_by_shape(model) and not clamped):
         return _built(model, scene, resolution)
-    if _moves_ends_alone(of, scene):
-        line, chords = model.line._replace(bits=model.line.bits & ~without), model.start.e[[0, -1]]
-        chords = chords / np.linalg.norm(chords, axis=1)[:, None]
-        first = model.ends.values.frame.reshape(2, 3, 3)[:, :, 0]
-        return replace(model, line=line, ends=end_conditions(scene, (first[0], first[1]), chords, model.sea))
     cable = material(scene)
     placed = _cells(model, cable, of, scene, resolution)
     if placed is None:
         return None
     layout, s, zones = placed
-    if stiffeners_of(scene):
+    if attached(scene, BendStiffener):
         cable = material(scene, s if layout is None else layout.base)
     on_base = LineOnBase(cable, layout.base) if layout is not None else None
     if layout is not None and on_base is not None:
@@ -89,22 +84,6 @@ def nearby(
         model, line=line, zones=zones, ends=ends, sea=sea, length=float(line.s[-1]), cable=cable, layout=layout,
         on_base=on_base, attached=tuple(cable.at.tolist()), inextensible=not line.ck.any(),
     )  # fmt: skip
-
-
-def _moves_ends_alone(of: LineScene, scene: LineScene) -> bool:
-    """Whether ends that are held are elsewhere, and nothing else is another one."""
-    if scene.environment.seabed is not None or scene.obstacles:
-        return False
-    if any(getattr(scene, x) is not getattr(of, x) for x in type(scene).model_fields if x != "ends"):
-        return False
-    for x, y in zip(of.ends.both, scene.ends.both, strict=True):
-        if x is y:
-            continue
-        if not (isinstance(x, Pinned) and isinstance(y, Pinned)):
-            return False
-        if x.model_copy(update={"position": y.position}) != y:
-            return False
-    return True
 
 
 def _held_axes(model: Model, of: LineScene, scene: LineScene, line: Line, cable: Material) -> Floats:

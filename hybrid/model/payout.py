@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import SceneError, refuse_value
 from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.reel import LEAVES
 from hybrid.kernels.state.report import SOIL
@@ -20,9 +20,9 @@ from hybrid.kernels.state.state import Floats, Line, slip_size
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Layout, LineOnBase, Zone
-from hybrid.model.sections import bending_stiffness, restrictors_of, stiffeners_of
+from hybrid.model.sections import attached, bending_stiffness
 from hybrid.scene.analysis import AdaptiveModel
-from hybrid.scene.attachments import Spread
+from hybrid.scene.attachments import BendRestrictor, BendStiffener, Spread
 from hybrid.scene.cable import Section
 from hybrid.scene.ends import Payout
 from hybrid.scene.motion_file import RecordRefused, check_file, read_table
@@ -259,7 +259,8 @@ def payout_plan(
     low, high = extremes(law, length, duration)
     longest = max(high, payout.longest or 0.0)
     if payout.longest is not None and high > payout.longest:
-        refuse(f"{where}.longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
+        expected = f"at least {high:.6g} m, which is paid out"
+        refuse_value(f"{where}.longest", f"{payout.longest:g}", expected, "leave it out")
     sections = _from_far_end(scene, longest)
     s = line.s if side else length - line.s[::-1]
     fixed = _last_fixed(scene, zones, side)
@@ -274,18 +275,18 @@ def payout_plan(
         place = fixed if side else length - fixed
         what = "last" if side else "first"
         expected = f"{fewest} cells between the {what} joint, load or change of section, s = {place:g} m, and the winch"
-        refuse(where, "payout", expected, "more cells, or a longer cable")
+        refuse_value(where, "payout", expected, "more cells, or a longer cable")
     layer = s[-1] - s[s.size - 1 - ride :]
     shortest = float(s[near + FEWEST_CELLS - 1] + layer[0])
     if low < shortest:
         given, fix = f"a length of {low:.6g} m", "take less in, or take more cells"
         left = f"{fewest} cells must be left behind the {'last' if side else 'first'} joint, load or change of section"
         expected = f"at least {shortest:.6g} m: {left}"
-        refuse(where, given, expected, fix)
+        refuse_value(where, given, expected, fix)
     h = float(s[-1 - ride] - s[-2 - ride])
     if not (longest - length) / h < MOST_CELLS:
         given, expected = f"{longest:.6g} m of line in cells of {h:.6g} m", f"at most {MOST_CELLS} cells"
-        refuse(where, given, expected, "pay less out (the rate is in m/s, the length in m), or take longer cells")
+        refuse_value(where, given, expected, "pay less out (the rate is in m/s, the length in m), or take longer cells")
     nodes = _with_cells(s[: s.size - ride].tolist(), sections, longest, h, ride)
     winch = winch_of(payout, length)
     winch.least, winch.most = shortest, longest
@@ -308,7 +309,7 @@ def _last_fixed(scene: LineScene, zones: Sequence[Zone], side: int) -> float:
     points = [x for x in (at if side else length - at).tolist() if x < length]
     out = scene.cable.sections if side else scene.cable.sections[::-1]
     changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
-    sleeves = [x.range[1] if side else length - x.range[0] for x in (*stiffeners_of(scene), *restrictors_of(scene))]
+    sleeves = [x.range[1] if side else length - x.range[0] for x in attached(scene, BendStiffener, BendRestrictor)]
     return max([joint, *points, *changes, *sleeves, _catenary_up_to(scene)])
 
 
@@ -387,7 +388,7 @@ def _from_far_end(scene: LineScene, longest: float) -> list[Section]:
         if held < more * (1 - 1e-9):
             fix = "a longer last section"
             where = f"{winch_at(scene)}.reel"
-            refuse(where, f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", fix)
+            refuse_value(where, f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", fix)
         return [*out, *payout.reel, payout.reel[-1].model_copy(update={"length": scene.length})]
     return [*out, out[-1].model_copy(update={"length": more + scene.length})]
 
@@ -408,14 +409,14 @@ def whole_scene(scene: LineScene) -> tuple[LineScene, float]:
         return scene, 0.0
     sections = _from_far_end(scene, longest_out(scene))
     if winch_side(scene):
-        return scene.model_copy(update={"cable": scene.cable.model_copy(update={"sections": tuple(sections)})}), 0.0
+        return replace(scene, cable=scene.cable.model_copy(update={"sections": tuple(sections)})), 0.0
     more = sum(x.length for x in sections) - scene.length
     attached = []
     for x in scene.cable.attachments:
         moved = {"range": (x.range[0] + more, x.range[1] + more)} if isinstance(x, Spread) else {"at": x.at + more}
         attached.append(x.model_copy(update=moved))
     changed = {"sections": tuple(sections[::-1]), "attachments": tuple(attached)}
-    return scene.model_copy(update={"cable": scene.cable.model_copy(update=changed)}), -more
+    return replace(scene, cable=scene.cable.model_copy(update=changed)), -more
 
 
 def cable_of(scene: LineScene, cells: Floats | None = None) -> Material:
@@ -463,10 +464,6 @@ def naming_connection(name: str) -> Iterator[None]:
         raise SceneError([replace(x, where=re.sub(r"^ends\.", at, x.where)) for x in error.complaints]) from None
 
 
-def refuse(where: str, given: str, expected: str, fix: str) -> NoReturn:
-    raise SceneError([Complaint(where, given, expected, fix)])
-
-
 def _rows(rows: list[tuple[float, list[float]]]) -> Floats:
     """(K, 8) rows from times and coefficients, highest power first, of any number."""
     out = np.zeros((len(rows), 8))
@@ -507,23 +504,24 @@ def _rows_of(path: str, length: float, where: str) -> dict[str, Floats]:
         header, table, lines = read_table(path, checked)
     except RecordRefused as refused:
         found = refused.finding
-        refuse(f"{where}.file", found.given or name, found.expected, found.fix)
+        refuse_value(f"{where}.file", found.given or name, found.expected, found.fix)
     key, rows = ("rates", 2) if "rate" in header else ("lengths", 3)
     t, x = table[:, header.index("t")], table[:, 1 - header.index("t")]
     if len(t) < rows:
-        refuse(f"{where}.file", f"{name}, {len(t)} rows", f"at least {rows} rows", "sample more finely")
+        refuse_value(f"{where}.file", f"{name}, {len(t)} rows", f"at least {rows} rows", "sample more finely")
     for k in np.flatnonzero(np.diff(t) <= 0.0)[:1]:
         given = f"{name}, line {lines[k + 1]}: t = {t[k + 1]:.9g} after t = {t[k]:.9g}"
-        refuse(f"{where}.file", given, "times that increase strictly", "sort the rows and drop duplicates")
+        refuse_value(f"{where}.file", given, "times that increase strictly", "sort the rows and drop duplicates")
     if t[0] != 0.0 or (key == "rates" and x[0] != 0.0):
         expected = "a first row at t = 0" + (" with rate 0, because the line is at rest" if key == "rates" else "")
-        refuse(f"{where}.file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
+        refuse_value(f"{where}.file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
     if key == "lengths":
         for k in np.flatnonzero(x <= 0.0)[:1]:
-            refuse(f"{where}.file", f"{name}, line {lines[k]}: length = {x[k]:.9g}", "lengths > 0, in m", "correct it")
+            given = f"{name}, line {lines[k]}: length = {x[k]:.9g}"
+            refuse_value(f"{where}.file", given, "lengths > 0, in m", "correct it")
         if abs(x[0] - length) > SAME_LENGTH * length:
             given, expected = f"{name}, line {lines[0]}: length = {x[0]:.9g}", f"{length:.9g} m, that of the cable"
-            refuse(f"{where}.file", given, expected, "the same length at t = 0, in m")
+            refuse_value(f"{where}.file", given, expected, "the same length at t = 0, in m")
     return {key: np.column_stack([t, x])}
 
 
@@ -558,22 +556,11 @@ def _law_of_lengths(table: Floats, length: float, where: str) -> Floats:
     t, out = table.T
     if abs(out[0] - length) > SAME_LENGTH * length:
         given, expected = f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable"
-        refuse(f"{where}.lengths", given, expected, "the same length")
+        refuse_value(f"{where}.lengths", given, expected, "the same length")
     rest = [(1, 0.0), (2, 0.0)]
     spline = PPoly.from_spline(make_interp_spline(t, out, k=5, bc_type=(rest, rest)))
     pieces = [(float(x), a.tolist()) for x, y, a in zip(spline.x[:-1], spline.x[1:], spline.c.T, strict=True) if y > x]
     return _rows([*pieces, (float(t[-1]), [float(out[-1])])])
-
-
-def length_at(law: Floats, t: float) -> tuple[float, float, float]:
-    """Length (m) that is out at t (s), its rate (m/s) and the rate of that (m/s2), just before t where it jumps."""
-    row = law[max(int(np.searchsorted(law[:, 0], t)) - 1, 0)].tolist()
-    x, value, rate, twice = max(t - row[0], 0.0), 0.0, 0.0, 0.0
-    for c in row[1:]:
-        twice = twice * x + 2.0 * rate
-        rate = rate * x + value
-        value = value * x + c
-    return value, rate, twice
 
 
 def fastest(law: Floats) -> float:

@@ -10,11 +10,11 @@ from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isnan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import refuse_value
 from hybrid.kernels.laws.water import still_below
 from hybrid.kernels.state.report import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
 from hybrid.kernels.state.state import Floats
@@ -41,10 +41,7 @@ from hybrid.scene.accuracy import of_unnamed_model
 from hybrid.scene.analysis import AdaptiveModel, CatenaryModel, RodModel
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
-from hybrid.scene.schema import LineScene, SceneTables
-
-if TYPE_CHECKING:
-    pass
+from hybrid.scene.schema import Asked, LineScene
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
 # Another model must cost less than this part of rods, which need no criterion and leave nothing out.
@@ -126,7 +123,7 @@ def with_model(scene: LineScene, kind: str) -> LineScene:
     changed: dict[str, Any] = {"model": MODELS[kind]()}
     if (accuracy := accuracy_of(scene)) is not None:
         changed["accuracy"] = of_unnamed_model(accuracy, holds_stress(scene.cable.sections))
-    return scene.model_copy(update=changed)
+    return replace(scene, **changed)
 
 
 def with_models(scene: Scene, kinds: Mapping[str, str]) -> Scene:
@@ -427,7 +424,7 @@ def equal_steps(
     return first, done, count, length
 
 
-def size_of_result(scene: SceneTables) -> float:
+def size_of_result(scene: Asked) -> float:
     """Bytes of the file of a run, roughly."""
     return (scene.require_time().duration / scene.output_interval + 1.0) * scene.size_of_output
 
@@ -439,16 +436,16 @@ def refuse_too_much(scene: LineScene) -> None:
     if count > MOST_OUTPUTS:
         fix = f"output.every: {time.duration / 1000:.3g} makes a thousand"
         expected = f"at most {MOST_OUTPUTS} outputs"
-        raise SceneError([Complaint("output.every", f"{every:g} s, {count:.3g} outputs", expected, fix)])
+        refuse_value("output.every", f"{every:g} s, {count:.3g} outputs", expected, fix)
     points, size = scene.points_kept, size_of_result(scene)
     if size > MOST_BYTES:
         given = f"{points} points at {count + 1.0:.6g} times, some {size / 1e9:.3g} GB"
         fix = f"output.points: 101, or output.every: {time.duration / 100:.3g}"
-        raise SceneError([Complaint("output.points", given, f"a result of at most {MOST_BYTES / 1e9:g} GB", fix)])
+        refuse_value("output.points", given, f"a result of at most {MOST_BYTES / 1e9:g} GB", fix)
     steps = time.duration / (time.step or time.duration)
     if steps > MOST_STEPS:
         expected = f"at most {MOST_STEPS:g} steps, some months of computing"
-        raise SceneError([Complaint("time.step", f"{time.step:g} s, {steps:.3g} steps", expected, "make it larger")])
+        refuse_value("time.step", f"{time.step:g} s, {steps:.3g} steps", expected, "make it larger")
 
 
 def output_times(scene: LineScene) -> list[float]:

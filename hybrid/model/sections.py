@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ SECTION_LIMITS: dict[str, tuple[str, str, np.ufunc]] = {
     "min_tension": ("N", "smallest tension allowed", np.fmax),
     "max_contact_force": ("N/m", "largest contact force per length allowed", np.fmin),
 }
+Kind = TypeVar("Kind")
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
 
@@ -74,7 +75,7 @@ def weakest_bending(scene: LineScene, s: np.ndarray) -> np.ndarray:
     """The smaller bending stiffness (ns,) N m^2 at arc lengths s (m), with stiffeners; at a seam the weaker one."""
     found = _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
     near, length = 1e-9 * scene.length, scene.length
-    for x in stiffeners_of(scene):
+    for x in attached(scene, BendStiffener):
         a, b = x.range
         inside = (s > a + near if a > near else s >= 0.0) & (s < b - near if b < length - near else s <= length)
         found[inside] += [x.stiffness(float(at)) for at in s[inside]]
@@ -133,24 +134,12 @@ def attachments_at(scene: LineScene) -> Iterator[tuple[float, Float | Clump | Sw
 
 def swivels(scene: LineScene) -> list[float]:
     """Arc lengths, m, at which the cable turns freely about itself."""
-    return sorted(x.at for x in scene.cable.attachments if isinstance(x, Swivel))
+    return sorted(x.at for x in attached(scene, Swivel))
 
 
-def modules_of(scene: LineScene) -> Iterator[Modules]:
-    """What is spread over stretches of the line."""
-    for x in scene.cable.attachments:
-        if isinstance(x, Modules):
-            yield x
-
-
-def stiffeners_of(scene: LineScene) -> list[BendStiffener]:
-    """Bend stiffeners on the line."""
-    return [x for x in scene.cable.attachments if isinstance(x, BendStiffener)]
-
-
-def restrictors_of(scene: LineScene) -> list[BendRestrictor]:
-    """Bend restrictors on the line."""
-    return [x for x in scene.cable.attachments if isinstance(x, BendRestrictor)]
+def attached(scene: LineScene, *kinds: type[Kind]) -> list[Kind]:
+    """Attachments of some kinds, such as `Modules`, in the order of the scene."""
+    return [x for x in scene.cable.attachments if isinstance(x, kinds)]
 
 
 def attached_weights(scene: LineScene) -> list[float]:
@@ -170,7 +159,7 @@ def section_changes(scene: LineScene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where bending stiffness jumps: between sections, at the ends of stiffeners."""
     found = [*accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1])]
     near = 1e-9 * scene.length
-    for edge in (edge for x in (*stiffeners_of(scene), *restrictors_of(scene)) for edge in x.range):
+    for edge in (edge for x in attached(scene, BendStiffener, BendRestrictor) for edge in x.range):
         if near < edge < scene.length - near and all(abs(edge - s) > near for s in found):
             found.append(edge)
     return tuple(sorted(found))

@@ -23,9 +23,10 @@ from hybrid.kernels.watch.extremes import Watched, fold_extremes, pass_on
 from hybrid.model.build import Model, as_begun
 from hybrid.model.contents import no_contact
 from hybrid.model.payout import whole_scene
-from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, modules_of, section_changes
+from hybrid.model.sections import NEAR, SECTION_LIMITS, attached, limits_along, section_changes
 from hybrid.outputs.observed_states import Grid
 from hybrid.outputs.quantities import Pipes, StepQuantities
+from hybrid.scene.attachments import Modules
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.lines_contact import SelfWatch
 from hybrid.solve.network_steps import no_extremes
@@ -57,7 +58,7 @@ NEVER_NEAR = blank_itself(np.ones(1)).found
 
 def marked_places(scene: LineScene, model: Model) -> tuple[tuple[float, int], ...]:
     """Arc lengths, m, of point loads, ends of modules and changes of section, with their bits of state.books."""
-    edges = [x for modules in modules_of(scene) for x in modules.range]
+    edges = [x for modules in attached(scene, Modules) for x in modules.range]
     loads = tuple((float(x), b.LOADED) for x in (*model.attached, *edges))
     return loads + tuple((float(x), b.SEAM) for x in section_changes(scene))
 

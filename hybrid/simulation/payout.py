@@ -14,7 +14,7 @@ from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.node_changes import energy_of
-from hybrid.kernels.reel.paid_length import carry_layers
+from hybrid.kernels.reel.paid_length import carry_layers, length_at
 from hybrid.kernels.reel.payout import (
     end_payout,
     fit_line,
@@ -31,7 +31,7 @@ from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFF
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, Zone, on_other_parts
-from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, length_at, lengths_at, payout_of
+from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, lengths_at, payout_of
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
@@ -133,7 +133,7 @@ class PayingOut:
         """
         numbers = self.reel.numbers
         of_winch = float(numbers.length), float(numbers.rate), float(numbers.acceleration)
-        L, c, a = of_winch if self.holds_tension else length_at(self.law, t)
+        L, c, a = of_winch if self.holds_tension else length_at.py_func(self.law, t)
         law = np.zeros((2, 8))
         law[:, 0] = t, t + over
         law[0, 3:] = 0.5 * c / over**3 + 0.25 * a / over**2, -c / over**2 - 2.0 * a / (3.0 * over), 0.5 * a, c, L
@@ -507,7 +507,7 @@ class PayingOut:
         ValueError: it cannot be so long, or so short.
         """
         if self.plan.from_outside and not (self.ended or self.stopped):
-            length, rate = asked or (None, length_at(self.law, begin)[1])
+            length, rate = asked or (None, length_at.py_func(self.law, begin)[1])
             self.drive(begin, end, length, rate)
 
     def drive(self, begin: float, end: float, length: float | None, rate: float) -> None:
@@ -515,7 +515,7 @@ class PayingOut:
 
         length: None: the one to which a rate that changes evenly leads.  ValueError: longer or shorter than can be.
         """
-        L, c, _ = length_at(self.law, begin)
+        L, c, _ = length_at.py_func(self.law, begin)
         dt = end - begin
         to = self._checked(L + 0.5 * (c + rate) * dt if length is None else length)
         mean = (to - L) / dt

@@ -355,26 +355,22 @@ class NetworkSolver(LineJobs):
 
     def _count_contact_energy(self, states: NetworkState) -> None:
         """Put what contact does to held ends into the reports and powers of states that have just been evaluated."""
+        before = {k: self.work[k].report[NET_A : NET_A + 6].copy() for k in self._touching_lines}
         for k, contact in self._contacts.items():
-            x, books, report = self.lines[k], self.books[k], self.work[k].report
-            before = report[NET_A : NET_A + 6].copy()
-            contact.count_energy(states.lines[k], x.ends, report)
-            added = (report[NET_A : NET_A + 6] - before).reshape(2, 3)
-            books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
-            books.report[0] = report
+            contact.count_energy(states.lines[k], self.lines[k].ends, self.work[k].report)
         if self.shared is not None:
-            self._count_shared_energy()
-
-    def _count_shared_energy(self) -> None:
-        """The same of lines that may touch each other."""
-        assert self.shared is not None
-        before = {k: self.work[k].report[NET_A : NET_A + 6].copy() for k in self.shared.lines}
-        self.shared.count_energies(self.work, [x.ends for x in self.lines])
+            self.shared.count_energies(self.work, [x.ends for x in self.lines])
         for k, net in before.items():
             books, report = self.books[k], self.work[k].report
             added = (report[NET_A : NET_A + 6] - net).reshape(2, 3)
             books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
             books.report[0] = report
+
+    def _stand(self, states: NetworkState) -> None:
+        """Lines stand where states have them, in the water that is there."""
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
+            work.u[:] = 0.0
+            self._around(x, state, work)
 
     def _around(self, x: JoinedLine, state: State, work: Work) -> None:
         if x.line.bits & WAVES:
@@ -390,9 +386,7 @@ class NetworkSolver(LineJobs):
         (n, n) m/N, rad/N, .., of the points (3 each), then of the bodies (3 of the origin, 3 of the rotation), from the
         factors of its lines.  Friction is left out.  ca: 1/s2, of springs of that times the mass.
         """
-        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
-            work.u[:] = 0.0
-            self._around(x, state, work)
+        self._stand(states)
         taken = self._solve(Task(JUNCTIONS, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
         m = self._matrix.shape[1] - 1
         if taken.outcome != Outcome.OK:
@@ -433,9 +427,7 @@ class NetworkSolver(LineJobs):
         False: the system is singular.
         """
         self._gaps[:] = 0.0
-        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
-            work.u[:] = 0.0
-            self._around(x, state, work)
+        self._stand(states)
         taken = self._solve(Task(CORRECTION, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
         return taken.outcome == Outcome.OK
 

@@ -13,7 +13,8 @@ import hybrid
 import hybrid.model.payout
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.errors import SceneError
-from hybrid.model.payout import law_of, length_at
+from hybrid.kernels.reel.paid_length import length_at
+from hybrid.model.payout import law_of
 from hybrid.scene.ends import Payout
 from hybrid.simulation import line_result
 from hybrid.simulation.line_result import LineResult, OutputsAside
@@ -131,7 +132,7 @@ def test_a_pendulum_of_variable_length() -> None:
     law = law_of(Payout(**payout), 10.0, duration)
 
     def swing(t: float, y: np.ndarray) -> list[float]:
-        length, rate, _ = length_at(law, t)
+        length, rate, _ = length_at.py_func(law, t)
         return [y[1], -(2.0 * rate * y[1] + G * np.sin(y[0])) / length]
 
     errors = []
