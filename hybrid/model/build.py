@@ -300,7 +300,10 @@ def build(
 
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
     start, shape_name, ends = first_state(scene, line, cable, sea, scale, shape)
-    others = _other_starts(scene, line, cable, scale, shape is not None) if spare and like is None else []
+    others = list[tuple[str, State]]()
+    if spare and like is None:
+        shapes = spare_shapes(scene, s) if shape is not None else from_joint(scene, s)
+        others = [(name, other_state(scene, r, line, cable, scale)) for name, r in shapes]
     plane, flat = in_plane(scene, start, others, ends.values)
     kept: Floats | None = None
     if plane is not None and (line.bits & OBSTACLES or scene.contact.self):  # which are computed in space
@@ -318,12 +321,6 @@ def build(
         plane=plane, kept_in=kept,
         payout=paid or payout_plan(scene, line, zones, to_compare=to_compare),
     )  # fmt: skip
-
-
-def _other_starts(scene: LineScene, line: Line, cable: Material, scale: float, hangs: bool) -> list[tuple[str, State]]:
-    """Shapes to begin with where the first one leads nowhere, by name; hangs: that is a catenary."""
-    shapes = spare_shapes(scene, line.s) if hangs else from_joint(scene, line.s)
-    return [(name, other_state(scene, r, line, cable, scale)) for name, r in shapes]
 
 
 def place_cells(

@@ -51,7 +51,7 @@ from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody, way_out
 from hybrid.scene.network import Network
 from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.points import Connections, Fairlead
+from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene, reachable_obstacles
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
@@ -238,11 +238,13 @@ def build_system(
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
             known[name] = KnownMotion(body, models[0].sea)
+    connections = [x.connections for x in system.lines.values()]
+    turns = ((getattr(x.start, "turns", 0.0), getattr(x.end, "turns", 0.0)) for x in connections)
     return NetworkModel(
         tuple(system.lines), tuple(models), free, system.rigid, joints, places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
-        tuple(_turns_of(x.connections) for x in system.lines.values()), touching, may_meet, rides=rides,
+        tuple(turns), touching, may_meet, rides=rides,
     )  # fmt: skip
 
 
@@ -310,11 +312,6 @@ def first_lines(system: Network, made: Sequence[BodyModel], resolution: NetworkR
     """What makes lines between first places of points and bodies, with free points that are not turned yet."""
     _, places, bodies = first_places(system, made)
     return FirstLines(system, _joined(system, places, bodies), bodies, resolution)
-
-
-def _turns_of(held: Connections) -> tuple[float, float]:
-    a, b = (getattr(x, "turns", 0.0) for x in (held.start, held.end))
-    return a, b
 
 
 def bodies_of(system: Network) -> tuple[BodyModel, ...]:

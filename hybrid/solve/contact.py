@@ -331,6 +331,14 @@ class TouchingLine(NamedTuple):
     grows: float = 0.0  # m, by which it may become longer before these arrays are made anew
 
 
+def _shifted_grips(saved: Mapping[str, Any], shift: Floats) -> Floats:
+    """Grips that are saved, of lines whose places in the one line are others by a shift (K,) m."""
+    grips: Floats = saved["grips"].copy()
+    for column in (AT, FOOT):
+        grips[:, column] += shift[np.searchsorted(saved["lows"], grips[:, column], side="right") - 1]
+    return grips
+
+
 class SharedContact(ContactBooks):
     """Contact of lines with each other and, where they may, with themselves."""
 
@@ -504,11 +512,8 @@ class SharedContact(ContactBooks):
             met[:, :, MET_S] += shift[then, None]
             met[:, :, MET_OTHER] += shift[then]
             meetings[np.ix_(now, now)] = met
-            grips.append(saved["grips"].copy())
-            for column in (AT, FOOT):
-                of = np.searchsorted(saved["lows"], grips[0][:, column], side="right") - 1
-                grips[0][:, column] += shift[of]
-            grips[0] = grips[0][np.isfinite(grips[0]).all(axis=1)]
+            moved = _shifted_grips(saved, shift)
+            grips.append(moved[np.isfinite(moved).all(axis=1)])
         for k, part in zip(own, parts[before is not None :], strict=True):
             rows = part["grips"].copy()
             rows[:, [AT, FOOT]] += self.starts[places[k]]
@@ -519,14 +524,11 @@ class SharedContact(ContactBooks):
 
     def _shifted(self, saved: Mapping[str, Any]) -> dict[str, Any]:
         """What is saved of lines that had other lengths, with the arc lengths that places have in the one line now."""
-        shift, grips, meetings = self.starts - saved["starts"], saved["grips"].copy(), saved["meetings"].copy()
-        for column in (AT, FOOT):
-            of = np.searchsorted(saved["lows"], grips[:, column], side="right") - 1
-            grips[:, column] += shift[of]
+        shift, meetings = self.starts - saved["starts"], saved["meetings"].copy()
         meetings[:, :, MET_S] += shift[:, None]
         meetings[:, :, MET_OTHER] += shift
         now = {"starts": self.starts.copy(), "lows": self._lows.copy()}
-        return {**saved, "grips": grips, "meetings": meetings} | now
+        return {**saved, "grips": _shifted_grips(saved, shift), "meetings": meetings} | now
 
     def attach(
         self, numbers: NDArray[np.int64], joints: NDArray[np.int64], books: Sequence[Books]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_law import ACROSS, ALONG, FOLLOWS, FORCE, NORMAL, RATES, SLOPE, WX, WY, P, Q
 from hybrid.kernels.contact.self_contact_pairs import Contact
-from hybrid.kernels.junctions.bodies import MASS, V
+from hybrid.kernels.junctions.bodies import V
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.report import FRICTION, SELF_FRICTION, TWIST, WAVES
 from hybrid.kernels.state.state import Floats
@@ -32,7 +32,7 @@ from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.flaws import slack_cell, slack_text
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.search import MOST_FALLS, PUSHED, SAME, damped_bodies
+from hybrid.solve.search import MOST_FALLS, PUSHED, are_same, damped_bodies, time_scale_of
 from hybrid.solve.stability import (
     ANCHOR,
     CALM,
@@ -348,7 +348,7 @@ class _Falls:
 
     def is_new(self, states: NetworkState) -> bool:
         """Whether an equilibrium is none of those that have been left."""
-        return not any(self._are_same(states, x) for x in self._known)
+        return not any(are_same(states, x, self._solver.length) for x in self._known)
 
     def try_later(self, start: NetworkState) -> None:
         """Begin the next motion there, where the first leads nowhere."""
@@ -362,10 +362,6 @@ class _Falls:
             self._left = [self._along(states, shapes, way) for way in (-1.0, 1.0)] if square < 0.0 else []
             self._left.append(self.nudged(states))  # the first, being the smallest: to the nearest rest
         return self._left.pop() if self._left else None
-
-    def _are_same(self, one: NetworkState, other: NetworkState) -> bool:
-        apart = max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True))
-        return apart <= SAME * self._solver.length
 
     def _along(self, states: NetworkState, shapes: Sequence[Floats], way: float) -> NetworkState:
         out = states.copy()
@@ -405,8 +401,7 @@ def settled_system(
     """
     smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~(WAVES | FRICTION | SELF_FRICTION))) for x in lines]
     found = touching_solver(smooth, points, bodies, contacts)
-    mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
-    time_scale, path, total = float(np.sqrt(mass * found.length / found.scale)), list[str](), 0
+    time_scale, path, total = time_scale_of(found), list[str](), 0
     slow = [x._replace(line=damped(x.line, x.length, time_scale, DAMPING), slackens=True) for x in smooth]
     slow_bodies = damped_bodies(bodies, time_scale)
     falls = _Falls(found, time_scale)

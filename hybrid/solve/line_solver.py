@@ -16,10 +16,9 @@ from hybrid.kernels.state.report import FRICTION, OBSTACLES, RESIDUAL, RESIDUAL_
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.step import States, friction_axes
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
-from hybrid.solve.search import Solution
 from hybrid.solve.stability import DAMPING, Stability, stop
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
-from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, NetworkTaken, workspace_of
+from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, NetworkTaken, Solution, workspace_of
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 # An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
@@ -34,29 +33,29 @@ MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at
 class LineSolver:
     """Solves for one line that is joined to nothing that moves with it, in space or in its plane."""
 
-    settling = DAMPING
+    settling = DAMPING  # of a motion to rest, as of solve.stability.damped
     bodies: Floats = np.zeros((0, NUMBERS))
 
     def __init__(self, x: JoinedLine) -> None:
         self.lines: tuple[JoinedLine, ...] = (x,)
         self.length, self.scale = x.length, x.scale
         self.work, self.anchor = workspace_of(x.line), Stability(x.line, x.sea, x.length, x.scale).anchor
-        self.blurred: set[int] = set()
+        self.blurred: set[int] = set()  # as of `NetworkSolver`
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> LineSolver:
-        """As of `Solver`."""
+        """The same of another line."""
         return LineSolver(lines[0])
 
     def newton(self, start: NetworkState) -> Solution:
-        """As of `Solver`: an equilibrium out of which a rod would buckle is none that anybody will see."""
+        """Static Newton from `start`, which stays; not OK too where what was found would not stay."""
         return self._judged(start, *self._balance(start, False, True))
 
     def turned(self, start: NetworkState) -> Solution:
-        """As of `Solver`."""
+        """As `newton`, with chords that are turned."""
         return self._judged(start, *self._balance(start, True, True))
 
     def balance(self, start: NetworkState) -> Solution:
-        """As of `Solver`, as far as Newton's method says so."""
+        """As `newton`, whatever the state is in which forces balance, as far as Newton's method says so."""
         return self._balance(start, False, False)
 
     def _judged(self, start: NetworkState, taken: NetworkTaken, new: NetworkState) -> Solution:
@@ -111,7 +110,7 @@ class LineSolver:
     def step(
         self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float
     ) -> NetworkTaken:
-        """As of `Solver`."""
+        """A step of dt (s) to `new`, which is overwritten."""
         x, report = self.lines[0], self.work.report
         task = entry.step_task(dt, before, rho, Limits(REACH * x.length, x.scale, MOST_OF_STEP), rho_before)
         states = States(old.lines[0], new.lines[0], NO_PUSH, NO_PUSH)
@@ -120,7 +119,7 @@ class LineSolver:
         return replace(taken, rho=float(report[USED_RHO]))
 
     def proof(self, states: NetworkState) -> float:
-        """As of `Solver`; infinity when it cannot be told."""
+        """Largest force (N) that is left over in states at rest; infinity when it cannot be told."""
         (line, sea, ends, *_), state = self.lines[0], states.lines[0]
         if line.bits & FRICTION:
             friction_axes(sea, state.r, state.e, state.slip, state.grip)
@@ -129,5 +128,5 @@ class LineSolver:
         return float(self.work.report[RESIDUAL]) if bad < 0 else float("inf")
 
     def is_balanced(self, states: NetworkState, residual: float) -> bool:
-        """As of `Solver`."""
+        """Whether a largest residual force (N) is round-off of the forces in states."""
         return residual <= BALANCED * (float(np.abs(states.lines[0].T).max()) + self.scale)

@@ -456,11 +456,12 @@ class NetworkSolver(LineJobs):
         return taken
 
     def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> NetworkSolver:
-        """As of `solve.search.Solver`, without contact."""
+        """The same of other lines that are joined likewise, without contact; bodies: None: of the same ones."""
         return NetworkSolver(lines, len(self.net), self.bodies if bodies is None else bodies)
 
-    def turned(self, start: NetworkState) -> None:
-        """As of `solve.search.Solver`: chords are not turned."""
+    def turned(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState] | None:
+        """None: chords are not turned, as those of a line by itself are."""
+        return None
 
     def newton(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ from hybrid.solve.flaws import (
     on_obstacles,
     slack_text,
 )
+from hybrid.solve.line_solver import LineSolver
+from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import (
     CALM,
     GROWN,
@@ -51,7 +53,7 @@ from hybrid.solve.stability import (
     nudged,
     stop,
 )
-from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, NetworkTaken, hold_by_friction
+from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, NetworkTaken, Solution, hold_by_friction
 
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
@@ -72,7 +74,7 @@ LIMP = 1e-3  # part of the bending stiffness with which a continuation begins
 # What a balanced state may be and yet no equilibrium; the first is what a search that found none tells.
 FLAWS = (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED)
 
-Solution = tuple[NetworkTaken, NetworkState]
+Solver = LineSolver | NetworkSolver  # of one line that nothing moves, or of several that meet
 Start = tuple[str, NetworkState]
 
 
@@ -81,40 +83,6 @@ def summary_of(path: Sequence[str], iterations: int) -> str:
     failed = len(path) - 1
     others = f" (after {failed} other way{'s' * (failed > 1)})" if failed else ""
     return f"{path[-1].split(':')[0]}, {iterations} iterations{others}"
-
-
-class Solver(Protocol):
-    """What a search asks of lines that are solved together."""
-
-    lines: tuple[JoinedLine, ...]
-    bodies: Floats  # (B, NUMBERS)
-    scale: float  # N
-    length: float  # m, of the longest line
-    settling: float  # damping of their motion to rest, as of solve.stability.damped
-    blurred: set[int]  # numbers of lines of the last equilibrium of which round-off hides whether they buckle
-
-    def newton(self, start: NetworkState) -> Solution:
-        """Static Newton from `start`, which stays; not OK too where what was found is no equilibrium."""
-
-    def balance(self, start: NetworkState) -> Solution:
-        """As `newton`, whatever the state is in which forces balance."""
-
-    def turned(self, start: NetworkState) -> Solution | None:
-        """As `newton`, with chords that are turned; None: it cannot."""
-
-    def step(
-        self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float
-    ) -> NetworkTaken:
-        """A step of dt (s) to `new`, which is overwritten."""
-
-    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> Solver:
-        """The same of other lines that are joined likewise; bodies: None: of the same ones."""
-
-    def proof(self, states: NetworkState) -> float:
-        """Largest force (N) that is left over in states at rest; reports follow."""
-
-    def is_balanced(self, states: NetworkState, residual: float) -> bool:
-        """Whether a largest residual force (N) is round-off of the forces in states."""
 
 
 class Tally:
@@ -296,6 +264,11 @@ def attempts(solver: Solver, starts: Iterable[Start], others: Iterable[Start], t
     yield from ways.falls()
 
 
+def are_same(one: NetworkState, other: NetworkState, length: float) -> bool:
+    """Whether unstable equilibria count as one; length: m, of the longest line."""
+    return max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True)) <= SAME * length
+
+
 class _Fall(NamedTuple):
     """A line that buckles, and its softest motion there, as of `Stability.softest_motion`."""
 
@@ -318,13 +291,9 @@ class _Ways:
         taken, states = solution
         self.first = taken.outcome if self.first is None else self.first
         flaw = taken.outcome in (Outcome.UNSTABLE, Outcome.FOLDED)
-        if flaw and not any(self._are_same(states, x) for _, x in self._flawed):
+        if flaw and not any(are_same(states, x, self.solver.length) for _, x in self._flawed):
             self._flawed.append((taken.line, states))
         return Attempt(how, taken, states, self.solver, real)
-
-    def _are_same(self, one: NetworkState, other: NetworkState) -> bool:
-        apart = max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True))
-        return apart <= SAME * self.solver.length
 
     def newton(self, how: str, start: NetworkState) -> Attempt:
         """Newton's method from a start."""
@@ -428,7 +397,7 @@ class _Ways:
     def falls(self) -> Iterator[Attempt]:
         """Slow falls from states in which a line buckles, to both sides, from that which grows least first."""
         solver, slow = self.solver, list[_Fall]()
-        time_scale = _time_scale(solver)
+        time_scale = time_scale_of(solver)
         for _ in range(MOST_FALLS):
             slow += [self._fall(*x) for x in self._flawed[self._seen :] if x[0] >= 0]
             self._seen, slow = len(self._flawed), sorted((x for x in slow if x.square < 0.0), key=lambda x: x.square)
@@ -476,7 +445,7 @@ def _taut(solver: Solver, taken: NetworkTaken, states: NetworkState) -> Solution
     return taken, states
 
 
-def _time_scale(solver: Solver) -> float:
+def time_scale_of(solver: Solver) -> float:
     """s, in which the lines and bodies settle."""
     mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
     return float(np.sqrt(mass * solver.length / solver.scale))
@@ -487,7 +456,7 @@ def relaxed(solver: Solver, start: NetworkState, tally: Tally, longest: float = 
 
     longest: s, of the steps; at least the time scale.  Sheaves are held: without friction nothing turns them.
     """
-    time_scale = _time_scale(solver)
+    time_scale = time_scale_of(solver)
     longest = max(longest, time_scale)
     lines, old = [], start.copy()
     for k, x in enumerate(solver.lines):

@@ -168,6 +168,9 @@ class NetworkTaken:
     rho: float = 0.0  # spectral radius at infinity of the step
 
 
+Solution = tuple[NetworkTaken, NetworkState]
+
+
 class LineFailed(ComputationError):
     """A computation of lines stopped: number of the line where it did, -1 for a point."""
 
