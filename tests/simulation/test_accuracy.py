@@ -611,41 +611,6 @@ def test_steps_see_what_a_motion_file_does(tmp_path):
     assert first_resolution(slow).step == pytest.approx(2.0 / 12)  # a twelfth of the period of the heave
 
 
-@pytest.mark.long
-def test_a_finer_run_is_no_other_result(tmp_path):
-    """Several result runs go into one file, which need not be overwritten, and leave nothing beside it."""
-    target = tmp_path / "run.h5"
-    result = hybrid.run(swinging(accuracy="0.2 N"), target, overwrite=False)
-    assert result.status == "complete" and "errors" in result
-    result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "fine.h5", overwrite=False)
-    assert result.attributes["effort_runs"] > 4
-    assert sorted(x.name for x in tmp_path.iterdir()) == ["fine.h5", "run.h5"]
-    with pytest.raises(hybrid.ResultError, match="exists"):
-        hybrid.run(swinging(accuracy="0.2 N"), target, overwrite=False)
-
-
-def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
-    """The result before it stands, with its figure, and says what became of the other."""
-    from hybrid.errors import ComputationError, Outcome
-    from hybrid.simulation.case import Case
-
-    record, count = Case.record, []
-
-    def failing(self, resolution, target, control):
-        count.append(resolution)
-        if len(count) > 1:
-            target.with_suffix(".snapshot.npz").write_bytes(b"as a motion that fails leaves one")
-            raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
-        return record(self, resolution, target, control)
-
-    monkeypatch.setattr(Case, "record", failing)
-    result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
-    assert len(count) == 2 and len(result.times) == 61 and "errors" in result
-    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
-    assert "failed" in missed.text
-    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
-
-
 def test_a_reader_does_not_lose_the_figure(tmp_path):
     """Somebody reads the file when the figure is written."""
     target = tmp_path / "run.h5"
@@ -687,28 +652,6 @@ def test_a_given_model_is_not_computed_more_finely_for_its_own_error():
     result = hybrid.run(swinging(model="catenary", accuracy="0.1%"))
     (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
     assert "model" in missed.text and result.attributes["effort_runs"] <= 5
-
-
-def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
-    """Ctrl-C in the second run: the first stays, with its figure, and says that it is not what was asked."""
-    from hybrid.simulation.case import Case
-
-    record, count = Case.record, []
-
-    def stopping(self, resolution, target, control):
-        count.append(resolution)
-        if len(count) > 1:
-            raise KeyboardInterrupt
-        return record(self, resolution, target, control)
-
-    monkeypatch.setattr(Case, "record", stopping)
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
-    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
-    with hybrid.open(tmp_path / "run.h5") as result:
-        assert result.attributes["error_total_end_force"] > 0.01
-        (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
-        assert "stopped" in missed.text
 
 
 def test_an_equilibrium_does_not_replace_a_file_unasked(tmp_path):

@@ -111,24 +111,6 @@ def test_a_line_that_is_let_go_is_not_at_rest(form: Any) -> None:
     assert held.from_rest and not Case(form(SCENE | {"ends": ends}), None).from_rest
 
 
-@pytest.mark.long
-def test_what_was_stopped_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A result is completed, with its errors."""
-    scene = SCENE | {"model": "catenary", "output": {"every": 0.05, "exact": True}}
-    whole, path = hybrid.run(scene, tmp_path / "whole.h5"), tmp_path / "cut.h5"
-
-    def stop(progress: Any) -> None:
-        if progress.name == "result" and progress.t > 0.3:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr("hybrid.simulation.progress.REPORT_EVERY", 0.0)
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene, path, progress=stop)
-    found = hybrid.resume(path)
-    np.testing.assert_allclose(found["tension"], whole["tension"], rtol=1e-9)
-    assert found.attributes["error_total_position"] > 0.0
-
-
 # --- How long a call of the compiled run may take: Ctrl-C is heard while zones change every few steps, and in many
 # waves ---
 

@@ -142,21 +142,6 @@ def test_limits_that_leave_no_room_are_refused() -> None:
         scene("cable.sections[0].max_tension=10", "cable.sections[0].min_tension=20")
 
 
-def test_it_is_in_a_file_that_was_stopped(tmp_path: Path) -> None:
-    def stop(progress: object) -> None:
-        if progress.t > 1.0:  # type: ignore[attr-defined]
-            raise KeyboardInterrupt
-
-    path = tmp_path / "run.h5"
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene("mesh={cells: 400}", "output={every: 0.5}"), path, progress=stop)
-    hybrid.resume(path)
-    whole = hybrid.run(scene("mesh={cells: 400}", "output={every: 0.5}"), tmp_path / "whole.h5")
-    with hybrid.open(path) as result:
-        for name in result["envelope"]:
-            assert result[f"envelope/{name}"].tobytes() == whole[f"envelope/{name}"].tobytes(), name
-
-
 @pytest.mark.needs("xarray", "h5netcdf")
 def test_it_is_exported(tmp_path: Path) -> None:
     result = hybrid.run(scene("output={every: 2}", "time.duration=0.5"))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from numpy.typing import NDArray
 
 import hybrid
@@ -16,7 +17,7 @@ from hybrid import Result
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.simulation.watches import Knot, Loops, crossings_of_knot, note_hockling, note_knot, note_loops
-from tests.scenes import cable_scene, line_between, network_scene, pinned_at
+from tests.scenes import cable_scene, network_scene, pinned_at
 
 HEIGHT = 2.0  # m
 
@@ -256,13 +257,14 @@ def meetings(result: hybrid.Result) -> list[Any]:
     return [event for event in result.events if event.kind == "line meets itself"]
 
 
-def test_an_end_that_is_led_through_the_line() -> None:
+def test_an_end_that_is_led_through_the_line(tmp_path: Path) -> None:
+    """A run that is stopped after it has been said goes on with the least clearance, and does not say it again."""
     scene = hanging(
         [0.6, 0, -1.0], model="rod", time={"duration": 4.0, "step": 0.02}, output={"every": 0.02, "points": 101},
         contact={"self": False},
     )  # fmt: skip
     scene["ends"]["end"]["motion"] = {"travel": {"by": [-1.2, 0, 0], "over": 4.0}}
-    result = hybrid.run(scene)
+    result = resumed(scene, tmp_path, 3.0)
     first = meetings(result)[0]
     assert first.s_a < 1.4 and first.s_b > 3.9  # the end, and the leg of the start, which hangs 1 m deep there
     assert first.value < first.threshold == pytest.approx(0.02)
@@ -288,58 +290,6 @@ def test_legs_of_an_equilibrium_that_are_in_each_other() -> None:
 def test_without_a_diameter_there_is_nothing_to_look_for() -> None:
     result = hybrid.static(hanging([0.1, 0, -0.5], diameter=None))
     assert not meetings(result) and not any(key in result for key in KEYS)
-
-
-# --- a line of several ---
-
-HOSE = {
-    "length": 50, "mass": 3.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 10,
-    "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
-}  # fmt: skip
-SEA = {"fluid": {"density": 1025}}
-TRAVEL = {"travel": {"by": [0, 0, -45], "over": 20}}
-TIME = {"duration": 22.0, "step": 0.1}
-LOWER, UPPER = [0, 0, -49.9], [0.5, 0, 0]
-
-
-def lowered(duration: float = TIME["duration"]) -> dict[str, Any]:
-    """A hose whose upper end is lowered until it lies across itself, and a rope beside it that stays straight."""
-    rope = {"start": "deck", "end": "ground", "sections": [{"length": 49, "mass": 1.0, "diameter": 0.02}]}
-    return network_scene(
-        {"low": {"position": LOWER}, "high": {"position": UPPER, "motion": TRAVEL}, "deck": {"position": [9, 0, 0]},
-         "ground": {"position": [9, 0, -49.9]}},
-        {"hose": line_between("low", "high", HOSE, model="rod", mesh=40, contact={"self": False}),
-         "rope": rope | {"mesh": {"cells": 10}, "sections": [rope["sections"][0] | {"axial_stiffness": 1e5}]}},
-        environment=SEA, time=TIME | {"duration": duration}, output=1.0
-    )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("itself") / "hose.h5"
-    hybrid.run(lowered(), path, progress=False).close()
-    return path
-
-
-def test_a_line_that_meets_itself_says_so(file: Path) -> None:
-    with hybrid.open(file) as result:
-        met = [[x for x in line.events if x.kind == "line meets itself"] for line in result.lines.values()]
-        assert met[0] and not met[1] and float(result.lines["hose"]["self_distance/clearance"]) < 0.0
-
-
-@pytest.mark.long
-def test_a_run_that_goes_on_knows_of_it(file: Path, tmp_path: Path) -> None:
-    """The least clearance, and that it has been told, are in the checkpoint."""
-    with hybrid.open(file) as whole:
-        (first, *_) = [event.t for event in whole.lines["hose"].events if event.kind == "line meets itself"]
-        middle = round(0.5 * (first + 22.0), 1)
-        hybrid.run(lowered(middle), tmp_path / "part.h5", progress=False).close()
-        with hybrid.resume(tmp_path / "part.h5", until=22.0) as more:
-            for name in ("clearance", "s_a", "s_b", "time"):
-                one, other = (x.lines["hose"][f"self_distance/{name}"] for x in (whole, more))
-                assert float(one) == pytest.approx(float(other), rel=1e-9)
-            counts = [sum(event.kind == "line meets itself" for event in x.lines["hose"].events) for x in (whole, more)]
-            assert counts[0] == counts[1]
 
 
 # --- knots, and lines that leave a sheave ---

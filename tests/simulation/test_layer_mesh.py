@@ -75,26 +75,6 @@ def test_a_mesh_that_shows_all_bends_stays() -> None:
         assert np.array_equal(usual["curvature"], equal["curvature"])
 
 
-@pytest.mark.long
-@both_ways
-def test_runs_resumed_and_stepped_from_outside_have_the_same_cells(network: bool, tmp_path: Path) -> None:
-    heave = {"motion": {"heave": {"amplitude": 0.5, "period": 4}, "ramp": 4}}
-    cable = scene({"sections": [section(200, 500)]}, CLAMP, FAR | heave)
-    made = said(cable | {"time": {"duration": 0.8, "step": 0.1}}, network)
-    whole = hybrid.run(made, tmp_path / "whole.h5")
-    assert 100 < line_of(whole)["mesh/s"].size - 1 < 115
-    hybrid.run(said(cable, network), tmp_path / "half.h5").close()
-    longer = hybrid.resume(tmp_path / "half.h5", until=0.8)
-    with hybrid.Simulation(made, tmp_path / "stepped.h5") as stepped:
-        while stepped.t < 0.8 - 1e-9:
-            stepped.step()
-    outside = hybrid.open(tmp_path / "stepped.h5")
-    for other in (longer, outside):
-        assert np.array_equal(line_of(other)["mesh/s"], line_of(whole)["mesh/s"])
-        curvature = line_of(whole)["curvature"][-1]
-        assert np.allclose(line_of(other)["curvature"][-1], curvature, rtol=1e-9, atol=1e-12)
-
-
 @both_ways
 def test_what_is_stepped_has_the_cells_to_a_layer_of_its_rest(network: bool) -> None:
     """It knows no motion to come; 100 equal cells would be half as many."""

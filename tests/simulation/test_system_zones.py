@@ -207,18 +207,6 @@ def test_a_criterion_of_ones_own_asks_for_rods(network: bool) -> None:
     assert any(x.kind == "rod" and x.s_a < 25 < x.s_b for x in line.zones[-1])
 
 
-@pytest.mark.slow
-def test_a_criterion_of_ones_own_beside_an_accuracy() -> None:
-    """The result is that of the cable, and its errors, of runs that the criterion was asked in as well, nearly."""
-    asked = slackening(0.6, accuracy={"position": "5 cm", "tension": "5%"})
-    one, line = (line_of(hybrid.run(said(asked, x), criterion=asks_for_the_middle)) for x in (False, True))
-    assert [*line.zones] == [*one.zones]
-    assert np.abs(line.position - one.position).max() < 1e-9 * 60
-    for cause in ("mesh", "time", "total"):
-        name = f"errors/{cause}/position"
-        assert line[name].max() == pytest.approx(one[name].max(), rel=0.2), name
-
-
 def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
     """And asks for rods in that alone; where no zones move there is nothing to ask for."""
     short = mooring(time={"duration": 0.3, "step": 0.02})
