@@ -90,7 +90,7 @@ def taken_back(scene: Any) -> hybrid.Result:
             for k in range(round(duration / every)):
                 saved, until = simulation.save(), every * (k + 1)
                 simulation.advance(until)
-                if again and k % 2:
+                if again and k % 2 == 0:
                     simulation.restore(saved)
                     simulation.advance(until - 0.4 * every)
                     simulation.restore(saved)

@@ -17,6 +17,7 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.scene.root import in_full
 from hybrid.solve.network_solver import NetworkSolver
 from tests.combinations.networks import differences, events_differ
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 Tables = dict[str, Any]
 ROPE = {"mass": 2.0, "diameter": 0.04, "axial_stiffness": 2e5, "damping": {"mass": 0.2}}
@@ -31,26 +32,20 @@ def line(start: str, end: str, length: float, cells: int = 8, points: Any = None
 
 
 # Two spans, of which one end sways, far from all else; and such that hang in equilibrium.
-SPANS: Tables = {
-    "points": {
-        "a0": {"position": [-4, 20, 0]}, "a1": {"position": [4, 20, 0], "motion": SWAY},
-        "b0": {"position": [-4, 30, 0]}, "b1": {"position": [4, 30, 0], "motion": SWAY},
-    },
-    "lines": {
-        name: line(f"{name}0", f"{name}1", 80**0.5, points=[[-4, y, 0], [0, y, -2], [4, y, 0]])
-        for name, y in (("a", 20), ("b", 30))
-    },
-}  # fmt: skip
+SPANS: Tables = network_scene(
+    {"a0": {"position": [-4, 20, 0]}, "a1": {"position": [4, 20, 0], "motion": SWAY}, "b0": {"position": [-4, 30, 0]},
+     "b1": {"position": [4, 30, 0], "motion": SWAY}},
+    {name: line(f"{name}0", f"{name}1", 80**0.5, points=[[-4, y, 0], [0, y, -2], [4, y, 0]]) for name,
+     y in (("a", 20), ("b", 30))}
+)  # fmt: skip
 HUNG: Tables = {"points": SPANS["points"], "lines": {x: line(f"{x}0", f"{x}1", 9.0) for x in "ab"}}
 # A rope over a sheave that turns freely, one end of which heaves.
-OVER: Tables = {
-    "obstacles": {"drum": DRUM | {"friction": 0.3, "stiffness": 1e5, "bearing": {"inertia": 0.5, "damping": 0.1}}},
-    "points": {
-        "left": {"position": [-3, 0, -2]},
-        "right": {"position": [3, 0, -2], "motion": {"heave": {"amplitude": 0.3, "period": 3.0}, "ramp": 1}},
-    },
-    "lines": {"rope": line("left", "right", 6.9, 30)},
-}  # fmt: skip
+OVER: Tables = network_scene(
+    {"left": {"position": [-3, 0, -2]},
+     "right": {"position": [3, 0, -2], "motion": {"heave": {"amplitude": 0.3, "period": 3.0}, "ramp": 1}}},
+    {"rope": line("left", "right", 6.9, 30)},
+    obstacles={"drum": DRUM | {"friction": 0.3, "stiffness": 1e5, "bearing": {"inertia": 0.5, "damping": 0.1}}}
+)  # fmt: skip
 # A ball that hangs from a point that sways into the way of a taut line.
 BALL: Tables = {
     "bodies": {"ball": {"initial_guess": [0, 0, -5], "mass": 30.0, "inertia": [3.0] * 3,
@@ -61,11 +56,10 @@ BALL: Tables = {
               "taut": line("p0", "p1", 5.99, 12, [[-3, 0.9, -5], [3, 0.9, -5]])},
 }  # fmt: skip
 # The legs of a U come to touch each other.
-HANGS: Tables = {
-    "points": {"low": {"position": LOW, "motion": CLOSER}, "high": {"position": [1.2, 0, 0]}},
-    "lines": {"hose": {"start": "low", "end": "high", "model": "rod", "mesh": {"cells": 40}, "sections": [HOSE],
-                       "contact": RUBS}},
-}  # fmt: skip
+HANGS: Tables = network_scene(
+    {"low": {"position": LOW, "motion": CLOSER}, "high": {"position": [1.2, 0, 0]}},
+    {"hose": line_between("low", "high", HOSE, model="rod", mesh=40, contact=RUBS)},
+)
 
 
 def scene(*parts: Tables, duration: float = 1.0, step: float = 0.02, **more: Any) -> Tables:
@@ -334,12 +328,10 @@ def test_other_loads_may_take_a_line_out_of_its_plane(flat: list[list[int]], tmp
 def test_a_line_that_comes_near_itself_leaves_its_plane(flat: list[list[int]]) -> None:
     """To touch itself in space."""
     closer = {"travel": {"by": [1.19, 0.0, 0.0], "over": 1.5}}
-    tables = {
-        "cable": {"sections": [HOSE]}, "model": "rod", "mesh": {"cells": 40}, "initial": "equilibrium",
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": closer},
-                 "end": {"kind": "pinned", "position": [1.2, 0, 0]}},
-        "time": {"duration": 1.6, "step": 0.01}, "output": {"every": 0.1},
-    }  # fmt: skip
+    tables = cable_scene(
+        HOSE, pinned_at(0, 0, 0, motion=closer), pinned_at(1.2, 0, 0), model="rod", mesh=40, time=(1.6, 0.01),
+        output=0.1
+    )  # fmt: skip
     network = hybrid.run(as_network(tables))
     assert [e.kind for e in network.events].count("out of plane") == 1
     assert flat[0] == [0] and flat[-1] == []

@@ -15,6 +15,7 @@ from hybrid.kernels.state.books import ASK_STEPS
 from hybrid.scene.root import in_full
 from hybrid.simulation.new_run import Recording, new_run
 from hybrid.store.format import MemoryTarget
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 LIMIT, OVER = 450.0, 2.0  # N, s
 
@@ -57,12 +58,9 @@ def hanging(payout: dict[str, Any] | None = None, **tables: Any) -> dict[str, An
     """20 m of rod that hang from a winch, which pays out 1 m/s after 2 s unless it is told otherwise."""
     section = {"length": 20, "mass": 2, "axial_stiffness": 1e6, "bending_stiffness": 1}
     payout = {"longest": 40} | ({"rate": 1.0, "ramp": 2.0} if payout is None else payout)
-    return {
-        "cable": {"sections": [section]},
-        "ends": {"start": "free", "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
-        "time": {"duration": 8, "step": 0.02}, "output": {"every": 0.1},
-    } | tables  # fmt: skip
+    return cable_scene(
+        section, "free", pinned_at(0, 0, 0, payout=payout), model="rod", mesh=20, time=(8, 0.02), output=0.1
+    ) | tables  # fmt: skip
 
 
 def of_guard(result: hybrid.Result) -> list[Any]:
@@ -143,14 +141,12 @@ def test_a_winch_of_one_of_two_lines_with_zones_that_move_stops() -> None:
     """It is known by the name of the line."""
     part = {"mass": 2, "axial_stiffness": 1e6, "bending_stiffness": 1}
     up = {"payout": {"rate": 1.0, "ramp": 2.0, "longest": 40}}
-    scene = {
-        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [0, 0, -38]}, "c": {"position": [20, 0, 0]}},
-        "lines": {
-            "up": {"start": "b", "end": "a", "sections": [part | {"length": 40}], "connections": {"end": up}},
-            "over": {"start": "a", "end": "c", "sections": [part | {"length": 21}]},
-        },
-        "time": {"duration": 4, "step": 0.02}, "output": {"every": 0.1},
-    }  # fmt: skip
+    scene = network_scene(
+        {"a": {"position": [0, 0, 0]}, "b": {"position": [0, 0, -38]}, "c": {"position": [20, 0, 0]}},
+        {"up": line_between("b", "a", part | {"length": 40}, connections={"end": up}),
+         "over": line_between("a", "c", part | {"length": 21})},
+        time=(4, 0.02), output=0.1
+    )  # fmt: skip
     scene["lines"]["up"]["connections"]["end"]["payout"]["longest"] = 50
     for line in scene["lines"].values():
         line |= {"model": "adaptive", "mesh": {"cells": 20}}

@@ -17,6 +17,7 @@ from hybrid.errors import SceneError
 from hybrid.model.build import WHAT, build
 from hybrid.scene.read import one_line
 from hybrid.simulation.lone_planes import PlaneMonitor
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Two marches that solve the same equations end Newton within its tolerance of each other, 1e-9 of the length.
@@ -142,12 +143,11 @@ def test_what_is_written_in_a_plane_goes_on_after_a_stop(model: str, dimension: 
     """Turns, torques and moments between two clamps too, which a line that may leave its plane has."""
     clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5]}
     travel = {"motion": {"travel": {"by": [0.05, 0, 0.1], "over": 0.5}}}
-    asked: dict[str, Any] = {
-        "cable": {"sections": [{"length": 12.0, "mass": 2.0, "bending_stiffness": 20.0, "torsional_stiffness": 15.0}]},
-        "ends": {"start": clamp, "end": clamp | {"position": [10, 0, 3], "tangent": [1, 0, 0.8]} | travel},
-        "initial": "equilibrium", "model": model, "mesh": {"cells": 12},
-        "time": {"duration": 0.5, "step": 2**-5}, "output": {"every": 2**-3},
-    }  # fmt: skip
+    asked: dict[str, Any] = cable_scene(
+        {"length": 12.0, "mass": 2.0, "bending_stiffness": 20.0, "torsional_stiffness": 15.0}, clamp,
+        clamp | {"position": [10, 0, 3], "tangent": [1, 0, 0.8]} | travel, model=model, mesh=12, time=(0.5, 2**-5),
+        output=2**-3
+    )  # fmt: skip
     whole = resumed(asked if dimension is None else asked | {"dimension": dimension}, tmp_path, 0.25)
     assert ("turns/link" in whole) == (dimension is None)
 
@@ -199,21 +199,13 @@ def deep_beam(part: float, **tables: Any) -> hybrid.Scene:
     """A cantilever as deep as a ruler under `part` of the tip load at which it topples, 4.0126 sqrt(EI GJ)/L^2."""
     EI, GJ, deep = 0.01, 0.008, 30.0
     critical = 4.0126 * np.sqrt(EI * GJ / ((1 - EI / deep) * (1 - GJ / deep)))
-    what = {
-        "environment": {"gravity": 0.0},
-        "cable": {
-            "sections": [{"length": 1.0, "mass": 0.1, "bending_stiffness": [deep, EI], "torsional_stiffness": GJ,
-                          "rotary_inertia": 0, "damping": {"mass": 0.2}}],
-        },
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]},
-            "end": {"kind": "free", "force": {"value": [0, 0, float(-part * critical)], "ramp": 1.0}},
-        },
-        "initial": {"kind": "straight", "direction": [1, 0, 0]},
-        "model": "rod",
-        "mesh": {"cells": 40},
-        "time": {"duration": 60.0, "step": 0.02},
-    }  # fmt: skip
+    what = cable_scene(
+        {"length": 1.0, "mass": 0.1, "bending_stiffness": [deep, EI], "torsional_stiffness": GJ, "rotary_inertia": 0,
+         "damping": {"mass": 0.2}},
+        clamped_at([0, 0, 0], [1, 0, 0], normal=[0, 1, 0]),
+        {"kind": "free", "force": {"value": [0, 0, float(-part * critical)], "ramp": 1.0}}, gravity=0.0,
+        initial={"kind": "straight", "direction": [1, 0, 0]}, model="rod", mesh=40, time=(60.0, 0.02)
+    )  # fmt: skip
     return scene(what, **tables)
 
 
@@ -257,16 +249,10 @@ def swinging(sway: float, phase: float, dimension: int | None = None) -> dict[st
     both = {"surge": {"amplitude": 0.6, "period": 4.0}, "sway": {"amplitude": sway, "period": 4.0, "phase": phase}}
     motion = both | {"heave": {"amplitude": 0.3, "period": 5.0}, "ramp": 4.0}
     section = {"length": 30, "mass": 2.0, "diameter": 0.03, "bending_stiffness": 20, "drag": {"normal": 1.2}}
-    return {
-        "environment": {"fluid": {"density": 1025}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [15, 20, 0], "motion": motion},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}, "time": {"duration": 4, "step": 0.05},
-        "output": {"every": 0.5, "points": 11},
-    } | ({"dimension": dimension} if dimension else {})  # fmt: skip
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(15, 20, 0, motion=motion), fluid={"density": 1025}, model="rod", mesh=20,
+        time=(4, 0.05), output=(0.5, 11)
+    ) | ({"dimension": dimension} if dimension else {})  # fmt: skip
 
 
 def test_surge_and_sway_in_phase_are_one_direction() -> None:
@@ -287,19 +273,13 @@ def test_a_string_whose_tension_swings_twice_as_fast_as_it_does(period: float, g
     tension, length, mass = 100.0, 10.0, 1.0
     first = 2 * length * np.sqrt(mass / tension)  # s, of its first mode: half of it is the period that makes it grow
     EA = 1e4
-    what = {
-        "environment": {"gravity": 0.0},
-        "cable": {"sections": [{"length": length, "mass": mass, "axial_stiffness": EA}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [length * (1 + tension / EA), 0, 0],
-                    "motion": {"surge": {"amplitude": 0.4 * length * tension / EA, "period": 0.5 * period * first}, "ramp": 4}},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "mesh": {"cells": 20},
-        "time": {"duration": 80.0, "step": 0.02, "rho_inf": 0.9},
-    }  # fmt: skip
+    what = cable_scene(
+        {"length": length, "mass": mass, "axial_stiffness": EA}, pinned_at(0, 0, 0),
+        pinned_at(length * (1 + tension / EA), 0, 0,
+                  motion={"surge": {"amplitude": 0.4 * length * tension / EA, "period": 0.5 * period * first},
+                          "ramp": 4}),
+        gravity=0.0, model="catenary", mesh=20, time=(80.0, 0.02, 0.9)
+    )  # fmt: skip
     result = hybrid.run(scene(what))
     assert bool(planes(result)) == grows
 
@@ -374,16 +354,12 @@ def test_an_end_moment_must_be_normal_to_the_plane() -> None:
 
 def test_a_load_that_is_let_go_in_a_plane_is_let_go_in_space() -> None:
     """The accelerations after it are found by the march in space, which steps in the plane had left their work in."""
-    what = {
-        "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "free", "force": {"value": [0.03, 0, 0], "until": 0.5}},
-        },
-        "initial": {"kind": "straight", "direction": [0.6, 0, -0.8]},
-        "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 0.7, "step": 0.01},
-        "output": {"every": 0.1, "points": 11, "errors": False},
-    }  # fmt: skip
+    what = cable_scene(
+        {"length": 1.0, "mass": 1.0}, pinned_at(0, 0, 0),
+        {"kind": "free", "force": {"value": [0.03, 0, 0], "until": 0.5}},
+        initial={"kind": "straight", "direction": [0.6, 0, -0.8]}, model="catenary", mesh=20, time=(0.7, 0.01),
+        output={"every": 0.1, "points": 11, "errors": False}
+    )  # fmt: skip
     flat, deep = (hybrid.run(scene(what, dimension=k)) for k in (2, 3))
     assert np.abs(flat.position - deep.position).max() < SAME
 
@@ -401,18 +377,10 @@ def storm(duration: float) -> hybrid.Scene:
     }  # fmt: skip
     waves = {"kind": "jonswap", "significant_height": 6, "peak_period": 11, "gamma": 2.5, "ramp": 60, "seed": 3}
     fluid = {"density": 1025, "surface": 0, "waves": waves | {"direction": 0}}
-    return hybrid.validate_scene(
-        {
-            "environment": {"fluid": fluid, "seabed": {"z": -100, "stiffness": 5e3, "damping": 5e2}},
-            "cable": {"sections": [section]},
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, -100]},
-                "end": {"kind": "pinned", "position": [205, 0, -5], "motion": {"follow": "waves"}},
-            },
-            "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40},
-            "time": {"duration": duration, "step": STEP}, "output": {"every": 0.5},
-        }
-    )  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        section, pinned_at(0, 0, -100), pinned_at(205, 0, -5, motion={"follow": "waves"}), fluid=fluid,
+        seabed={"z": -100, "stiffness": 5e3, "damping": 5e2}, model="rod", mesh=40, time=(duration, STEP), output=0.5
+    ))  # fmt: skip
 
 
 @pytest.mark.long

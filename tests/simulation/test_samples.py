@@ -17,6 +17,7 @@ from hybrid.errors import SceneError
 from hybrid.simulation import line_result
 from hybrid.simulation import run as run_module
 from hybrid.store.recorder import Rows
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
 ROD = {
     "length": 10.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
@@ -30,14 +31,10 @@ def swinging(model: str, step: float, every: float, **output: Any) -> hybrid.Sce
     end["motion"] = {
         "sway": {"amplitude": 0.5, "period": 2.5}, "roll": {"amplitude": 40, "period": 3.0}, "ramp": 2.0
     }  # fmt: skip
-    return hybrid.validate_scene(
-        {
-            "cable": {"sections": [ROD | {"damping": {"mass": 0.2, "stiffness": 0.02}}]},
-            "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.7]}, "end": end},
-            "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "dimension": 3,
-            "time": {"duration": 4.0, "step": step}, "output": {"every": every, "points": 21, **output},
-        }
-    )  # fmt: skip
+    return hybrid.validate_scene(cable_scene(
+        ROD | {"damping": {"mass": 0.2, "stiffness": 0.02}}, clamped_at([0, 0, 0], [1, 0, -0.7]), end, model=model,
+        mesh=40, dimension=3, time=(4.0, step), output={"every": every, "points": 21, **output}
+    ))  # fmt: skip
 
 
 def test_exact_outputs_are_ends_of_steps() -> None:
@@ -136,11 +133,10 @@ def test_outputs_within_a_step_follow_a_clamp_that_turns(motion: dict[str, Any])
     graded = 30.0 - np.cumsum(0.02 * 1.25 ** np.arange(20))[::-1]  # m, cells of 20 mm and more beside the end
     graded = graded[graded > 0.0]
     nodes = [*np.linspace(0.0, graded[0], 12).tolist(), *graded[1:].tolist(), 30.0]
-    scene = {
-        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "initial": "equilibrium",
-        "ends": {"start": start, "end": end | {"motion": motion | {"ramp": 6}}}, "model": "rod", "mesh": {"nodes": nodes},
-        "output": {"every": 0.1},
-    }  # fmt: skip
+    scene = cable_scene(
+        section, start, end | {"motion": motion | {"ramp": 6}}, fluid={"density": 1025}, model="rod",
+        mesh={"nodes": nodes}, output=0.1
+    )  # fmt: skip
     fine, coarse = (hybrid.run(scene | {"time": {"duration": 8, "step": step}}) for step in (0.01, 0.2))
     off = np.abs(coarse.moment_end - fine.moment_end).max(axis=1)
     assert off[1::2].max() < 3e-3 * np.abs(fine.moment_end).max()
@@ -166,26 +162,20 @@ def moored(step: float, every: float, duration: float = 3.0, **output: Any) -> d
     sway = {
         "sway": {"amplitude": 0.3, "period": 3.0}, "roll": {"amplitude": 6.0, "period": 3.0}, "ramp": 3.0
     }  # fmt: skip
-    return {
-        "environment": {"fluid": {"density": 1025, "current": [0.2, 0.1, 0]}},
-        "points": {
-            "west": {"position": [-15, 0, -16]}, "east": {"position": [15, 2, -16]},
-            "knot": {"initial_guess": [0, 0, -10], "mass": 30.0, "volume": 0.05, "drag_area": 0.3},
-            "eye": {"body": "buoy", "place": [0.2, 0, -0.8]}, "flange": {"body": "buoy", "place": [0.6, 0.1, 0]},
-            "rail": {"body": "ship", "place": [0, 0.5, 0]},
-        },
-        "bodies": {"buoy": BUOY, "ship": {"position": [9, 0, 1], "motion": sway}},
-        "lines": {
-            "west": {"start": "west", "end": "knot", "sections": [ROPE | {"length": 17.0}], "mesh": {"cells": 10}},
-            "east": {"start": "knot", "end": "east", "sections": [ROPE | {"length": 17.0}], "mesh": {"cells": 10}},
-            "up": {"start": "knot", "end": "eye", "sections": [ROPE | {"length": 9.0}], "mesh": {"cells": 8}},
-            "hose": {
-                "start": "flange", "end": "rail", "sections": [HOSE], "mesh": {"cells": 16}, "model": "rod",
-                "connections": {"start": {"tangent": [1, 0, 0.2]}, "end": {"tangent": [1, 0, 0.3]}},
-            },
-        },
-        "time": {"duration": duration, "step": step}, "output": {"every": every, "points": 9} | output,
-    }  # fmt: skip
+    return network_scene(
+        {"west": {"position": [-15, 0, -16]}, "east": {"position": [15, 2, -16]},
+         "knot": {"initial_guess": [0, 0, -10], "mass": 30.0, "volume": 0.05, "drag_area": 0.3},
+         "eye": {"body": "buoy", "place": [0.2, 0, -0.8]}, "flange": {"body": "buoy", "place": [0.6, 0.1, 0]},
+         "rail": {"body": "ship", "place": [0, 0.5, 0]}},
+        {"west": line_between("west", "knot", ROPE | {"length": 17.0}, mesh=10),
+         "east": line_between("knot", "east", ROPE | {"length": 17.0}, mesh=10),
+         "up": line_between("knot", "eye", ROPE | {"length": 9.0}, mesh=8),
+         "hose": line_between("flange", "rail", HOSE, mesh=16, model="rod",
+                              connections={"start": {"tangent": [1, 0, 0.2]}, "end": {"tangent": [1, 0, 0.3]}})},
+        fluid={"density": 1025, "current": [0.2, 0.1, 0]},
+        bodies={"buoy": BUOY, "ship": {"position": [9, 0, 1], "motion": sway}}, time=(duration, step),
+        output={"every": every, "points": 9} | output
+    )  # fmt: skip
 
 
 def fields(result: hybrid.Result) -> dict[str, np.ndarray]:
