@@ -84,12 +84,11 @@ def test_many_outputs_go_into_a_file(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert_same(kept, stored)
 
 
-@pytest.mark.parametrize("form", [as_scene, lambda x: in_full(as_scene(x))], ids=["cable", "named"])
-def test_errors_that_were_not_estimated_are_made_up_for(form: Any, monkeypatch: Any, tmp_path: Path) -> None:
+def test_errors_that_were_not_estimated_are_made_up_for(monkeypatch: Any, tmp_path: Path) -> None:
     """A result that is complete, but for its errors."""
     tables = SCENE | {"model": "catenary", "time": {"duration": 0.2, "step": 0.02}, "output": {"errors": True}}
     del tables["accuracy"]
-    scene, path = form(tables), tmp_path / "run.h5"
+    scene, path = in_full(as_scene(tables)), tmp_path / "run.h5"
 
     def stop(progress: Any) -> None:
         if progress.name == "error estimation":
@@ -102,13 +101,12 @@ def test_errors_that_were_not_estimated_are_made_up_for(form: Any, monkeypatch: 
     assert "error_total_position" in hybrid.resume(path).attributes
 
 
-@pytest.mark.parametrize("form", [as_scene, lambda x: in_full(as_scene(x))], ids=["cable", "named"])
-def test_a_line_that_is_let_go_is_not_at_rest(form: Any) -> None:
+def test_a_line_that_is_let_go_is_not_at_rest() -> None:
     """Its end forces then have the order of a start."""
-    held = Case(form(SCENE), None)
+    held = Case(as_scene(SCENE), None)
     ends = {name: dict(x) for name, x in SCENE["ends"].items()}
     ends["start"]["release_at"] = {"time": 0.4}
-    assert held.from_rest and not Case(form(SCENE | {"ends": ends}), None).from_rest
+    assert held.from_rest and not Case(as_scene(SCENE | {"ends": ends}), None).from_rest
 
 
 # --- How long a call of the compiled run may take: Ctrl-C is heard while zones change every few steps, and in many

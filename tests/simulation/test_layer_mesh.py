@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.store.reader import Result
-from tests.said import both_ways, line_of, said
+from tests.said import line_of, said
 
 DEFECT = Path(__file__).parents[1] / "data" / "defects" / "false_within.yaml"
 PIN, FAR = {"kind": "pinned", "position": [0, 0, 0]}, {"kind": "pinned", "position": [100, 0, 0]}
@@ -75,11 +75,10 @@ def test_a_mesh_that_shows_all_bends_stays() -> None:
         assert np.array_equal(usual["curvature"], equal["curvature"])
 
 
-@both_ways
-def test_what_is_stepped_has_the_cells_to_a_layer_of_its_rest(network: bool) -> None:
+def test_what_is_stepped_has_the_cells_to_a_layer_of_its_rest() -> None:
     """It knows no motion to come; 100 equal cells would be half as many."""
     layers = {"resolution": {"cells_per_layer": 6}}
-    made = said(scene({"sections": [section(200, 500)]}, CLAMP) | layers, network)
+    made = said(scene({"sections": [section(200, 500)]}, CLAMP) | layers, network=True)
     rest = line_of(hybrid.static(made))
     fade = np.sqrt(500 / rest.tension[0, 0])
     assert 6 < fade / np.diff(rest["mesh/s"])[0] < 15
@@ -89,11 +88,10 @@ def test_what_is_stepped_has_the_cells_to_a_layer_of_its_rest(network: bool) -> 
     assert np.abs(s - rest["mesh/s"]).max() < 1e-9 * 200
 
 
-@both_ways
-def test_errors_of_fixed_steps_are_those_of_such_cells(network: bool) -> None:
+def test_errors_of_fixed_steps_are_those_of_such_cells() -> None:
     """The curvature at the clamp, with its error: that of a fine mesh."""
     asked = SCENES["clamp"][0] | {"output": {"errors": True}}
-    result = line_of(hybrid.run(said(asked, True)) if network else hybrid.static(asked))
+    result = line_of(hybrid.run(said(asked, network=True)))
     true = 1.0 / sharpest(hybrid.static(SCENES["clamp"][0] | fine(200.0, 0.0, [])))
     off = abs(float(result["curvature"][0, 0]) - true)
     assert 0.3 * off < float(result["errors/total/curvature"][0, 0]) < 6.0 * off + 1e-3 * true
@@ -139,27 +137,25 @@ def test_zones_that_move_have_the_mesh_of_rods() -> None:
 # ---- a slack bend that is shorter than the cells of a loose accuracy -------------------------------
 
 
-def s_tether(network: bool, accuracy: str, duration: float = 20.0) -> Any:
+def s_tether(accuracy: str, duration: float = 20.0) -> Any:
     """3000 m that bend within 1.9 m where the heavy half hands over to the light one."""
     found = hybrid.load_scene(DEFECT.with_name("long_s_tether.yaml"), [f"time.duration={duration}"])
     data = found.model_dump(mode="json", exclude_none=True, exclude_unset=True) | {"accuracy": accuracy}
     data["output"] = {"every": 1.0, "points": 301}
-    return said(data, network)
+    return said(data, network=True)
 
 
-@both_ways
-def test_a_loose_accuracy_shows_a_slack_bend_at_rest(network: bool) -> None:
+def test_a_loose_accuracy_shows_a_slack_bend_at_rest() -> None:
     """10 % was refused: the first cells were of 60 m, and the only equilibrium that was found on them buckles."""
-    line = line_of(hybrid.static(s_tether(network, "10%")))
+    line = line_of(hybrid.static(s_tether("10%")))
     assert sharpest(line) == pytest.approx(1.742, rel=0.05)
     assert {x.verdict for x in line.verdicts().accuracy} == {"met"} and line.attributes["cells"] < 150
 
 
 @pytest.mark.long
-@both_ways
-def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong(network: bool) -> None:
+def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong() -> None:
     """At 5 % it was 62 m off, without an error figure."""
-    fine, *loose = (line_of(hybrid.run(s_tether(network, x, 60.0))) for x in ("1%", "5%", "10%"))
+    fine, *loose = (line_of(hybrid.run(s_tether(x, 60.0))) for x in ("1%", "5%", "10%"))
     for line, part in zip(loose, (0.05, 0.1), strict=True):
         off = np.linalg.norm(line.position - fine.position, axis=-1).max()
         assert off < line.attributes["error_total_position"] + fine.attributes["error_total_position"] < part * 60.0
@@ -168,8 +164,7 @@ def test_a_loose_accuracy_of_a_slack_bend_is_cheap_and_not_wrong(network: bool) 
 
 
 @pytest.mark.long
-@both_ways
-def test_tension_that_changes_by_little_is_no_doubt_where_nothing_holds_the_line(network: bool) -> None:
+def test_tension_that_changes_by_little_is_no_doubt_where_nothing_holds_the_line() -> None:
     """By 0.3 % of the largest (root mean square), twice; of a line on a bed with friction that is a doubt."""
-    line = line_of(hybrid.run(s_tether(network, "5%", 120.0)))
+    line = line_of(hybrid.run(s_tether("5%", 120.0)))
     assert {x.verdict for x in line.verdicts().accuracy} == {"met"}

@@ -30,7 +30,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample, restored_sample
 from hybrid.store.integrity import pack, unpack
 from hybrid.store.stored_rows import MissingRows
-from tests.said import both_ways, line_of, said
+from tests.said import line_of, said
 from tests.scenes import cable_scene, pinned_at
 
 
@@ -279,25 +279,22 @@ def kind_of(result: hybrid.Result) -> str:
     return str(hybrid.parse_scene(line_of(result).scene_text).model.kind)
 
 
-@both_ways
-def test_catenaries_where_they_cost_less_and_nothing_asks_for_rods(monkeypatch, network):
+def test_catenaries_where_they_cost_less_and_nothing_asks_for_rods(monkeypatch):
     monkeypatch.setattr(model_choice, "cheapest", lambda found: next(x for x in found if x.kind == "catenary"))
-    result = hybrid.run(said(TAUT, network))
+    result = hybrid.run(said(TAUT, network=True))
     assert "no choice" not in chosen(result) and "µs of processor time per step" in chosen(result)
     assert kind_of(result) == "catenary"
     assert "accuracy missed" not in {e.kind for e in result.events}
 
 
-@both_ways
-def test_rods_where_catenaries_are_no_choice(network):
-    result = hybrid.run(said(CLAMPED, network) | {"dimension": None})
+def test_rods_where_catenaries_are_no_choice():
+    result = hybrid.run(said(CLAMPED, network=True) | {"dimension": None})
     assert kind_of(result) == "rod"
     assert "rods everywhere" in chosen(result) and "an end is clamped" in chosen(result)
 
 
-@both_ways
-def test_rods_at_rest(network):
-    result = hybrid.static(said(TAUT | {"accuracy": "1%"}, network))
+def test_rods_at_rest():
+    result = hybrid.static(said(TAUT | {"accuracy": "1%"}, network=True))
     assert kind_of(result) == "rod" and REST in chosen(result)
 
 
@@ -311,10 +308,9 @@ def test_rods_are_the_same_as_asked_for(tmp_path, free):
     assert found and all("event" in x or "scene" in x for x in found), found
 
 
-@both_ways
 @pytest.mark.long
 @pytest.mark.parametrize("in_file", [False, True])
-def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file, network):
+def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file):
     """A line that is slackened, of which the criteria are not asked: rods, and why."""
     monkeypatch.setattr(model_choice, "no_catenary", lambda found, s: "")
     monkeypatch.setattr(
@@ -322,7 +318,7 @@ def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file, network
     )
     slackened = {"travel": {"by": [-30, 0, 0], "over": 4}}
     end = TAUT["ends"]["end"] | {"motion": slackened}
-    scene = said(TAUT | {"ends": TAUT["ends"] | {"end": end}}, network)
+    scene = said(TAUT | {"ends": TAUT["ends"] | {"end": end}}, network=True)
     result = hybrid.run(scene, tmp_path / "run.h5" if in_file else None)
     assert kind_of(result) == "rod"
     assert "were tried" in chosen(result)
@@ -330,15 +326,14 @@ def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file, network
     assert [x.name for x in tmp_path.iterdir() if x.suffix != ".lock"] == ["run.h5"] * in_file
 
 
-@both_ways
-def test_rods_after_catenaries_that_leave_out_too_much(monkeypatch, network):
+def test_rods_after_catenaries_that_leave_out_too_much(monkeypatch):
     monkeypatch.setattr(model_choice, "no_catenary", lambda found, s: "")
     monkeypatch.setattr(model_choice, "structural", lambda scene, cable: "")
     monkeypatch.setattr(
         model_choice, "cheapest", lambda found: next((x for x in found if x.kind == "catenary"), found[0])
     )
     stiff = {"sections": [TAUT["cable"]["sections"][0] | {"bending_stiffness": 2000}]}
-    result = hybrid.run(said(CLAMPED | {"cable": stiff}, network))
+    result = hybrid.run(said(CLAMPED | {"cable": stiff}, network=True))
     assert kind_of(result) == "rod"
     assert "leaving bending out makes" in chosen(result)
 

@@ -99,10 +99,9 @@ def test_an_end_that_is_moved_from_a_time_on(tmp_path, whole):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("form", [lambda x: x, in_full], ids=["cable", "network"])
-def test_a_change_is_made_where_the_run_stands_and_not_at_its_last_output(form, tmp_path, monkeypatch):
+def test_a_change_is_made_where_the_run_stands_and_not_at_its_last_output(tmp_path, monkeypatch):
     """Outputs every second, stopped half-way between two: the file has the time at which the change was made."""
-    scene = form(swinging(output={"every": 1.0, "points": 11}))
+    scene = in_full(swinging(output={"every": 1.0, "points": 11}))
     path = stopped(tmp_path / "run.h5", monkeypatch, scene, 160)
     with opened(path) as file:
         point = checkpoint.read_checkpoint(file)

@@ -19,7 +19,7 @@ from hybrid.scene.motion_tables import Motion
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
 from hybrid.simulation import equilibrium
-from tests.said import both_ways, line_of, said
+from tests.said import line_of, said
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 GJ, LENGTH = 0.789, 100.0
@@ -166,12 +166,11 @@ def test_turns_beyond_outputs(tmp_path, every, step):
     assert not {"unresolved twist", "gains energy"} & kinds(result)
 
 
-@both_ways
-def test_steps_in_which_an_end_turns_far_are_cut(tmp_path, network):
+def test_steps_in_which_an_end_turns_far_are_cut(tmp_path):
     """Two turns in 50 s, in steps of 10 s: they are cut so that none turns by more than a radian, and it is said."""
     time = {"duration": 60.0, "step": 10.0}
     scene = taut(second=wound(tmp_path, 2, 50, 60), time=time, output={"every": 10.0}, mesh={"cells": 8})
-    result = line_of(hybrid.run(said(scene, network)))
+    result = line_of(hybrid.run(said(scene, network=True)))
     np.testing.assert_allclose(result["torque"][-1], torque_of(2.0), rtol=1e-2)
     (cut,) = [e for e in result.events if e.kind == "steps cut"]
     assert "an end turns by" in cut.text and 15 < len(result["steps/t"]) < 30
