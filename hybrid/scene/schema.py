@@ -214,7 +214,7 @@ class LineScene(Asked):
 #     both ends are free, or are moved by other lines, or may be let go;
 #     an end may be set from outside, or its motion goes on for ever, or a vessel or a file has it;
 #     line is paid out;
-#     the obstacle is on a body or set from outside, moves so that it turns, or turns freely (bearing).
+#     the obstacle is on a body or set from outside, or moves so that it turns.
 
 # Parts of the length of which each has a ball: how much larger than necessary these are is a part of the length.
 PARTS = 64
@@ -314,6 +314,6 @@ def _shift_of_obstacle(obstacle: Obstacle) -> float:
     """How far (m) points of an obstacle move out of its shape at rest; infinite: no bound is known."""
     motion = obstacle.motion
     turns = motion is not None and any(getattr(motion, x) is not None for x in TURNS)
-    if isinstance(obstacle, Carried) or obstacle.from_outside or turns or getattr(obstacle, "bearing", None):
+    if isinstance(obstacle, Carried) or obstacle.from_outside or turns:
         return math.inf
     return _largest_shift(motion)

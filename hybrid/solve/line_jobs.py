@@ -13,17 +13,13 @@ from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.junctions.bodies import U
 from hybrid.kernels.junctions.body_contact import CARRY
 from hybrid.kernels.junctions.joined_lines import SEAT
-from hybrid.kernels.junctions.network_job import NetworkTask, find_near, lead_lone
+from hybrid.kernels.junctions.network_job import APART, APART_ALWAYS, JOINED, NetworkTask, find_near, lead_lone
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
 from hybrid.kernels.run.network import solve_system
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.report import (
-    FREE,
-    MOVES,
-    PLANAR,
-)
+from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
 from hybrid.kernels.step.newton import ASSEMBLY, RUN, Limits, Task, blank_job
 from hybrid.kernels.watch.named_quantities import note_quantities
@@ -73,17 +69,22 @@ class LineJobs:
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
         self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
         self._rides = lines[0].rides  # obstacles are those of all lines
-        self._sheaves = int((lines[0].line.moved == FREE).sum())
+        reaches = [bool(x.line.bits & OBSTACLES) for x in lines]
+        turning = int((lines[0].line.moved == FREE).sum())
+        self._sheaves = turning if any(reaches) else 0
+        free = bool(self._rides.size or turning)
         # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.  Of
-        # each whether it always moves with others (-1), or else how near it is to a body or sheave that it may move.
-        self._near = np.array([-1 if max(x.joints) >= 0 else 0 for x in lines], np.int64)
+        # each whether it always moves with others, or never, or else how near it is to what is free, which it may move.
+        apart = [APART if reach or not free else APART_ALWAYS for reach in reaches]
+        joined = [max(x.joints) >= 0 for x in lines]
+        self._near = np.where(joined, JOINED, apart)
         together = [k for k in self._touching_lines if k not in self._contacts or lines[k].keeps_pace]
-        self._near[together] = -1
+        self._near[together] = JOINED
         self._alone = np.zeros(len(lines), np.int64)
-        self._mixes = [bool(self._rides.size or self._sheaves) and near == 0 for near in self._near]
+        self._mixes = [free and near == APART for near in self._near]
         # Winches whose lengths may be unknowns of all lines; iterations of lines with winches that are by themselves.
         each = zip(lines, self._near, self._mixes, strict=True)
-        self._winches = sum(x.winds and bool(near < 0 or mixes) for x, near, mixes in each)
+        self._winches = sum(x.winds and bool(near == JOINED or mixes) for x, near, mixes in each)
         self._wound: dict[int, int] = {}
         self._reels: dict[int, NDArray[np.int64]] = {}  # tables of lines that are paid out
         self.work = [room_of_line(x, self._keeps(k, x)) for k, x in enumerate(lines)]
@@ -120,7 +121,7 @@ class LineJobs:
     def _keeps(self, number: int, x: JoinedLine) -> bool:
         """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
         beside = bool(self._rides.size or self._sheaves or self._winches)
-        mixes = beside and (self._mixes[number] or self._near[number] < 0)
+        mixes = beside and (self._mixes[number] or self._near[number] == JOINED)
         return x.winds or mixes or number in self._touching_lines
 
     @property
@@ -177,7 +178,7 @@ class LineJobs:
         found = {**values}
         if "iterated" in values:
             found["iterated"] = self._wound.get(number, 0)
-        if not self._mixes[number]:
+        if not (self._mixes[number] or self._near[number] == APART_ALWAYS):
             return found
         if (line := values.get("line")) is not None:
             moved = line.moved.copy()
@@ -192,8 +193,9 @@ class LineJobs:
 
     def _group(self) -> None:
         """Which lines are solved by themselves from now on, and tables for these and for the others."""
-        some = not any(self._mixes) or bool((self._near != 0).any())  # else what is free moves with the first line
-        self._alone[:] = (self._near == 0) & (some | (np.arange(len(self.lines)) > 0))
+        self._alone[:] = (self._near == APART) | (self._near == APART_ALWAYS)
+        if any(self._mixes) and self._alone.all():  # what is free moves with the first line that can reach it
+            self._alone[self._mixes.index(True)] = 0
         self.lone, self.joined = (np.flatnonzero(self._alone == x).tolist() for x in (1, 0))
         self.lone_numbers = np.zeros((len(self.lone), self._numbers.shape[2]), np.int64)
         self._lone_tables = {}
@@ -259,7 +261,7 @@ class LineJobs:
             self.work[k] = work._replace(X=np.zeros((x.line.h.size + 1) * (ROW + KEPT)))
             self.bind_line(k, work=self.work[k])
         if any(self._mixes):  # other right-hand sides have what lines may do to what is free
-            self._near[self._mixes], self._mixes = -1, [False] * len(self.lines)
+            self._near[self._mixes], self._mixes = JOINED, [False] * len(self.lines)
             self._group()
 
     def tables_by_itself(self, number: int) -> tuple[Table, Table, Table]:

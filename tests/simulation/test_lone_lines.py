@@ -13,6 +13,7 @@ from test_system_contact import CLOSER, HOSE, LOW, RUBS
 from test_winch import floating
 
 import hybrid
+from hybrid.kernels.junctions.network_job import JOINED
 from hybrid.kernels.state.report import PLANAR
 from hybrid.scene.root import in_full
 from hybrid.solve.network_solver import NetworkSolver
@@ -46,6 +47,11 @@ OVER: Tables = network_scene(
     {"rope": line("left", "right", 6.9, 30)},
     obstacles={"drum": DRUM | {"friction": 0.3, "stiffness": 1e5, "bearing": {"inertia": 0.5, "damping": 0.1}}}
 )  # fmt: skip
+# A rope under that sheave, which it does not touch.
+PASSES: Tables = network_scene(
+    {"p": {"position": [-3, 0.1, -6]}, "q": {"position": [3, 0.1, -6]}},
+    {"passes": line("p", "q", 2 * 15.25**0.5, points=[[-3, 0.1, -6], [0, 0.1, -8.5], [3, 0.1, -6]])},
+)
 # A ball that hangs from a point that sways into the way of a taut line.
 BALL: Tables = {
     "bodies": {"ball": {"initial_guess": [0, 0, -5], "mass": 30.0, "inertia": [3.0] * 3,
@@ -72,7 +78,7 @@ def scene(*parts: Tables, duration: float = 1.0, step: float = 0.02, **more: Any
 
 
 # Two lines from a body that hangs between them, beside a line of rods that many cells and slack make hard to find.
-JOINED: Tables = {
+BETWEEN: Tables = {
     "bodies": {"weight": {"initial_guess": [0, 0, -3], "mass": 40.0, "inertia": [1.0] * 3}},
     "points": {"left": {"position": [-4, 0, 0]}, "right": {"position": [4, 0, 0]},
                "eye": {"body": "weight", "place": [0, 0, 0.5]}},
@@ -86,11 +92,11 @@ BESIDE["lines"]["bent"]["sections"] = [ROPE | {"length": 150.0, "bending_stiffne
 
 
 def test_a_lone_line_comes_to_rest_as_by_itself() -> None:
-    names = JOINED["lines"] | BESIDE["lines"]
+    names = BETWEEN["lines"] | BESIDE["lines"]
     lines = {name: names[name] for name in ("first", "bent", "last")}
-    together = JOINED | {"points": JOINED["points"] | BESIDE["points"], "lines": lines}
+    together = BETWEEN | {"points": BETWEEN["points"] | BESIDE["points"], "lines": lines}
     found = dict(hybrid.static(together).each_line())
-    for apart in (JOINED, BESIDE):
+    for apart in (BETWEEN, BESIDE):
         for name, own in hybrid.static(apart).each_line():
             assert np.array_equal(found[name]["position"], own["position"])
             assert np.allclose(found[name]["tension"], own["tension"], rtol=1e-13)
@@ -129,11 +135,14 @@ def test_a_sheave_leaves_alone_what_does_not_touch_it(groups: list[list[int]]) -
     np.testing.assert_array_equal(beside.lines["b"]["obstacles/drum/rotation"], turned)
 
 
-def test_a_sheave_that_nothing_touches_turns_with_the_first_line(groups: list[list[int]]) -> None:
-    """It is another Newton for that line alone."""
-    beside = hybrid.run(scene(SPANS, obstacles=OVER["obstacles"], duration=0.2))
-    assert groups[-1] == [0]
-    same(beside, hybrid.run(scene(SPANS, duration=0.2)), "b")
+def test_a_sheave_that_nothing_touches_turns_with_the_first_line_that_may(groups: list[list[int]]) -> None:
+    """It is another Newton for that line alone; with none where no line can reach it, and then it is at rest."""
+    alone, drum = hybrid.run(scene(SPANS, duration=0.2)), {"obstacles": OVER["obstacles"]}
+    for near, joined in ((SPANS, []), (scene(SPANS, PASSES), [2])):
+        beside = hybrid.run(scene(near, drum, duration=0.2))
+        assert groups[-1] == joined
+        same(beside, alone)
+        assert not beside.lines["b"]["obstacles/drum/rotation"].any()
 
 
 def test_a_winch_of_a_joined_line_leaves_others_alone(groups: list[list[int]]) -> None:
@@ -153,7 +162,7 @@ def test_a_line_that_touches_itself_is_solved_by_itself(groups: list[list[int]])
 
 def all_together(solver: NetworkSolver, *_: Any) -> None:
     """Every line that may touch what is free moves with it always."""
-    solver._near[solver._mixes] = -1
+    solver._near[solver._mixes] = JOINED
 
 
 @pytest.mark.long
@@ -290,12 +299,14 @@ def test_an_obstacle_takes_only_lines_out_of_their_planes_that_may_reach_it(flat
         "points": {f"{x}{k}": {"position": [8 * k - 4, y, 0]} for x, y in zip("abc", (0, 20, 40), strict=True) for k in (0, 1)},
         "lines": {x: SPANS["lines"]["a"] | {"start": f"{x}0", "end": f"{x}1", "initial": "equilibrium"} for x in "abc"},
     }  # fmt: skip
-    beside = hybrid.run(scene(spans, ball(0, 20, 1), duration=0.2))
-    assert flat[-1] == [0, 2]
     alone = hybrid.run(scene(spans, duration=0.2))
     assert flat[-1] == [0, 1, 2]
-    for name, x in alone.lines.items():
-        np.testing.assert_allclose(beside.lines[name].position, x.position, rtol=0, atol=1e-8)
+    turning = {"obstacles": {"drum": DRUM | {"at": [0, 20, 1], "stiffness": 1e5, "bearing": {"inertia": 0.5}}}}
+    for near in (ball(0, 20, 1), turning):
+        beside = hybrid.run(scene(spans, near, duration=0.2))
+        assert flat[-1] == [0, 2]
+        for name, x in alone.lines.items():
+            np.testing.assert_allclose(beside.lines[name].position, x.position, rtol=0, atol=1e-8)
 
 
 @pytest.mark.long

@@ -114,7 +114,9 @@ def task_of(asked):
 # Of the radius of a line: how far from a body or sheave that is free it is near it.  A step goes a fraction of that where
 # a line comes to rest on something; if it touches before it is near, the try of the step is made again.
 NEARBY = 1.0
-# Of `near`: the line always moves with others.
+# Of `near`: the line cannot reach what is free, and is always solved by itself.
+APART_ALWAYS = -2
+# It always moves with others.
 JOINED = -1
 # Nothing that is free is near it.
 APART = 0
@@ -189,7 +191,7 @@ def find_near(table):
     """Find how near lines are to what is free, where steps with this table lead from; returns 0."""
     system = read_system(table)
     for l in range(system.tables.shape[0]):
-        if system.near[l] != JOINED:
+        if system.near[l] >= APART:
             system.near[l] = nearness(read(system.tables[l]), system.rides)
     return 0
 
@@ -207,13 +209,15 @@ def is_touched_alone(system):
 def is_grouped_otherwise(system):
     """Whether the next step is to be solved with other lines by themselves: those near nothing that is free.
 
-    Where nothing is near any, what is free moves with the first line.
+    Where nothing is near any, what is free moves with the first line that can reach it.
     """
-    some = False
+    leads = True
     for l in range(system.near.shape[0]):
-        some |= system.near[l] != APART
+        leads &= system.near[l] == APART or system.near[l] == APART_ALWAYS
     for l in range(system.near.shape[0]):
-        alone = system.near[l] == APART and (some or l > 0)
+        alone = system.near[l] == APART_ALWAYS
+        if system.near[l] == APART:
+            alone, leads = not leads, False
         if alone != (system.alone[l] != 0):
             return True
     return False
