@@ -24,7 +24,7 @@ from hybrid.errors import AS_MUCH
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Limited, RequestedAccuracy, Resolution
 from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
-from hybrid.scene.accuracy import ALONG, NOT_ASKED, ROUGHEST
+from hybrid.scene.analysis import ALONG, NOT_ASKED, ROUGHEST
 from hybrid.simulation.run_sample import END_FORCES, RunSample, Samples
 
 # Part of what is asked that the next run aims at.

@@ -45,8 +45,7 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.sections import swivels
-from hybrid.scene.accuracy import USUAL
-from hybrid.scene.analysis import AdaptiveModel, CatenaryModel
+from hybrid.scene.analysis import USUAL, AdaptiveModel, CatenaryModel
 from hybrid.scene.bodies import Carried, FreeBody
 from hybrid.scene.ends import Clamped, End, Payout, Pinned
 from hybrid.scene.network import Network, SomeScene
@@ -83,7 +82,8 @@ def self_reach(scene: LineScene) -> SelfReach:
     off = {
         "a section has no diameter": any(x.diameter is None for x in sections),
         "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
-        "dimension: 2, where contact: {self: true} alone computes it": scene.dimension == 2 or scene.contact.in_plane,
+        "dimension: 2, where contact: {self: true} alone computes it": scene.dimension == 2
+        or scene.contact.around.in_plane,
     }
     why = next((text for text, holds in off.items() if holds), "")
     if why:
@@ -113,7 +113,7 @@ def slack_of(scene: LineScene) -> float:
     Infinite where an end moves or may, is set from outside, breaks or is let go, or the line is paid out.
     """
     a, b = (end.held_position for end in scene.ends.both)
-    if a is None or b is None or payouts(scene) or scene.contact.ends_are_set:
+    if a is None or b is None or payouts(scene) or scene.contact.around.ends_are_set:
         return math.inf
     if any(x.prescribed_motion or x.release or not x.is_placed for x in scene.ends.both):
         return math.inf

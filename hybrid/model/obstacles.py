@@ -78,17 +78,18 @@ from hybrid.model.sections import merged_sections, tension_scale
 from hybrid.scene.analysis import Straight
 from hybrid.scene.base import unit
 from hybrid.scene.bodies import Carried, CarriedBox, CarriedCylinder
-from hybrid.scene.mesh_file import Mesh, read_mesh
 from hybrid.scene.motion import Elevation, EndMotion
 from hybrid.scene.obstacles import (
     BoxObstacle,
     CylinderObstacle,
+    Mesh,
     MeshObstacle,
     Obstacle,
     PlaneObstacle,
     SheaveObstacle,
     SphereObstacle,
     TorusObstacle,
+    read_mesh,
 )
 from hybrid.scene.schema import LineScene, reachable_obstacles
 

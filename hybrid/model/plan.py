@@ -37,8 +37,7 @@ from hybrid.model.resolution import (
     wants_errors,
 )
 from hybrid.model.sections import limits_along, outer_diameter
-from hybrid.scene.accuracy import of_unnamed_model
-from hybrid.scene.analysis import AdaptiveModel, CatenaryModel, RodModel
+from hybrid.scene.analysis import AdaptiveModel, CatenaryModel, RodModel, of_unnamed_model
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import Asked, LineScene

@@ -15,8 +15,17 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Grading
 from hybrid.model.sections import limits_along, output_points, tension_scale, weakest_bending
-from hybrid.scene.accuracy import NOT_ASKED, ROUGHEST, USUAL, Accuracy, amount
-from hybrid.scene.analysis import AdaptiveModel, CatenaryZone, RodModel, ZonesModel
+from hybrid.scene.analysis import (
+    NOT_ASKED,
+    ROUGHEST,
+    USUAL,
+    Accuracy,
+    AdaptiveModel,
+    CatenaryZone,
+    RodModel,
+    ZonesModel,
+    amount,
+)
 from hybrid.scene.cable import Cable, Section
 from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.motion_tables import SHIFTS, Motion

@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from hybrid.scene.base import (
     After,
@@ -18,7 +18,6 @@ from hybrid.scene.base import (
     Positive,
     PositivePair,
     Table,
-    by_kind,
     refuse,
 )
 
@@ -47,7 +46,26 @@ def _lifts(value: float) -> float:
 Lift = Annotated[Number, After(_lifts), Field(json_schema_extra={"minimum": 0})]
 
 
-class Float(Table):
+class Hung(Table):
+    """What all that hangs on a point of the cable has, behind keys of its own."""
+
+    bases_last = True
+
+    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
+    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
+    height: Positive | None = Field(default=None, description=HEIGHT)
+    shape: Shape = Field(default="sphere", description=SHAPE)
+
+    def volume_in(self, density: float, gravity: float) -> float:
+        """Displaced volume [m^3] in a fluid of `density` [kg/m^3] under `gravity` [m/s^2]."""
+        raise NotImplementedError
+
+    def height_in(self, density: float, gravity: float) -> float:
+        """Vertical extent [m]."""
+        return self.height if self.height is not None else sphere_diameter(self.volume_in(density, gravity))
+
+
+class Float(Hung):
     """A float at a point of the cable: a mass and a displaced volume, drag and added mass."""
 
     kind: Literal["float"] = Field(default="float", description="lifts the cable at a point: a buoy")
@@ -57,18 +75,9 @@ class Float(Table):
     )
     volume: Positive | None = Field(default=None, description="displaced volume; or buoyancy [m^3]")
     mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
-    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
-    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
-    height: Positive | None = Field(default=None, description=HEIGHT)
-    shape: Shape = Field(default="sphere", description=SHAPE)
 
     def volume_in(self, density: float, gravity: float) -> float:
-        """Displaced volume [m^3] in a fluid of `density` [kg/m^3] under `gravity` [m/s^2]."""
         return _volume_in(self, density, gravity)
-
-    def height_in(self, density: float, gravity: float) -> float:
-        """Vertical extent [m]."""
-        return self.height if self.height is not None else sphere_diameter(self.volume_in(density, gravity))
 
     @model_validator(mode="after")
     def _one_measure(self) -> Float:
@@ -76,48 +85,32 @@ class Float(Table):
         return self
 
 
-class Clump(Table):
-    """A weight at a point of the cable."""
+class Weight(Hung):
+    """What has a mass and a volume of its own."""
 
-    kind: Literal["clump"] = Field(default="clump", description="weighs on the cable at a point: a sinker, ballast")
-    at: NonNegative = Field(description="arc length s, its position on the cable [m]")
-    mass: Positive = Field(description="mass in air, its weight over gravity [kg]")
+    mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
     volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
-    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
-    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
-    height: Positive | None = Field(default=None, description=HEIGHT)
-    shape: Shape = Field(default="sphere", description=SHAPE)
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3], whatever the fluid."""
         return self.volume
 
-    def height_in(self, density: float, gravity: float) -> float:
-        """Vertical extent [m]."""
-        return self.height if self.height is not None else sphere_diameter(self.volume)
+
+class Clump(Weight):
+    """A weight at a point of the cable."""
+
+    kind: Literal["clump"] = Field(default="clump", description="weighs on the cable at a point: a sinker, ballast")
+    at: NonNegative = Field(description="arc length s, its position on the cable [m]")
+    mass: Positive = Field(description="mass in air, its weight over gravity [kg]")
 
 
-class Swivel(Table):
+class Swivel(Weight):
     """A joint at a point of the cable that passes force and bending moment, and no torque."""
 
     kind: Literal["swivel"] = Field(
         default="swivel", description="lets both sides of the cable turn freely against each other about its axis"
     )
     at: Positive = Field(description="arc length s, its position on the cable, between the ends [m]")
-    mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
-    volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
-    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
-    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
-    height: Positive | None = Field(default=None, description=HEIGHT)
-    shape: Shape = Field(default="sphere", description=SHAPE)
-
-    def volume_in(self, density: float, gravity: float) -> float:
-        """Displaced volume [m^3], whatever the fluid."""
-        return self.volume
-
-    def height_in(self, density: float, gravity: float) -> float:
-        """Vertical extent [m]."""
-        return self.height if self.height is not None else sphere_diameter(self.volume)
 
 
 class Spread(Table):
@@ -286,13 +279,4 @@ class BendRestrictor(Spread):
     )
 
 
-Attachment = Annotated[
-    Annotated[Float, Tag("<float>")]
-    | Annotated[Clump, Tag("<clump>")]
-    | Annotated[Swivel, Tag("<swivel>")]
-    | Annotated[Modules, Tag("<modules>")]
-    | Annotated[BendStiffener, Tag("<bend_stiffener>")]
-    | Annotated[BendRestrictor, Tag("<bend_restrictor>")],
-    Discriminator(by_kind),
-    Kinds(("float", "clump", "swivel", "modules", "bend_stiffener", "bend_restrictor"), usual=("float",)),
-]
+Attachment = Annotated[Float | Clump | Swivel | Modules | BendStiffener | BendRestrictor, Kinds(usual=("float",))]

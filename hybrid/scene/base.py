@@ -12,6 +12,7 @@ JSON schema and the docs all take them from there.
 from __future__ import annotations
 
 import difflib
+import inspect
 import math
 import re
 import sys
@@ -20,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, get_args, get_origin
 
 from pydantic import (
     AliasChoices,
@@ -29,7 +30,6 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
-    Tag,
     ValidationError,
 )
 from pydantic.fields import ComputedFieldInfo, FieldInfo
@@ -89,6 +89,7 @@ class Table(BaseModel):
     instead: ClassVar[Mapping[str, str]] = {}  # of keys that other tables have and this one cannot: what to do
     # Of keys that are no more, the value at which they asked for nothing: results of before 0.7 name every key.
     asked_nothing: ClassVar[Mapping[str, Any]] = {}
+    bases_last: ClassVar[bool] = False  # whether the keys of its bases come behind those of a table
 
     @classmethod
     def without_former(cls, value: Any) -> Any:
@@ -99,6 +100,10 @@ class Table(BaseModel):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        if cls.bases_last:
+            order = dict.fromkeys(name for base in cls.__mro__ for name in inspect.get_annotations(base))
+            for name in (x for x in order if x in cls.model_fields):
+                cls.model_fields[name] = cls.model_fields.pop(name)
         named = {name: field.validation_alias for name, field in cls.model_fields.items()}
         cls.former = {
             str(old): name
@@ -255,8 +260,7 @@ def _points_somewhere(value: tuple[float, float, float]) -> tuple[float, float, 
     return value
 
 
-@dataclass(frozen=True)
-class Before:
+class Reading:
     """What is done to a value before it is read, as by pydantic's BeforeValidator.
 
     That one inspects the function's signature anew wherever such a value stands, a fifth of the time that it takes to
@@ -267,6 +271,13 @@ class Before:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.function, handler(source))
+
+
+@dataclass(frozen=True)
+class Before(Reading):
+    """That it is done by a function."""
+
+    function: Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
@@ -299,9 +310,11 @@ NonNegativePair = Annotated[tuple[NonNegative, NonNegative], Before(numbers(2)),
 
 def parallel(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:
     """Whether two directions (or their opposites) are the same line."""
-    u, v = unit(a), unit(b)
-    cross = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
-    return math.hypot(*cross) < PARALLEL
+    return math.hypot(*cross(unit(a), unit(b))) < PARALLEL
+
+
+def cross(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def unit(a: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -342,35 +355,36 @@ def by_kind(value: Any) -> str | None:
     return f"<{kind}>"
 
 
-def _tagged(union: Any) -> Iterator[tuple[type[Table], str]]:
-    """The tables of a union by kind, each with its tag."""
-    for arm in get_args(union):
-        table, *marks = get_args(arm)
-        yield table, next(mark.tag for mark in marks if isinstance(mark, Tag)).strip("<>")
+def by_kinds(union: Any) -> dict[str, Any]:
+    """The tables of a union, as they are annotated, by their kind."""
+    while get_origin(union) is Annotated:
+        union = get_args(union)[0]
+    return {get_args(_table(arm).model_fields["kind"].annotation)[0]: arm for arm in get_args(union)}
 
 
-def _of_kind(table: type[Table]) -> str:
-    return table.model_fields["kind"].description or ""
+def _table(arm: Any) -> type[Table]:
+    table: type[Table] = get_args(arm)[0] if get_origin(arm) is Annotated else arm
+    return table
 
 
 @dataclass(frozen=True)
 class Kinds:
-    """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
+    """Annotation of a union of tables by `kind`: checks it first and takes a bare word as ``{kind: word}``.
 
     `usual` names what to advise where no kind is given; `implied`: keys that only one kind has, and that kind;
     `gone`: kinds that are no more, and what to do.
     """
 
-    names: tuple[str, ...]
     usual: tuple[str, ...]
     implied: tuple[tuple[str, str], ...] = ()
     gone: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        descriptions = {tag: _of_kind(table) for table, tag in _tagged(source)}
-        return core_schema.no_info_before_validator_function(
-            partial(self.check, descriptions=descriptions), handler(source)
-        )
+        arms = by_kinds(source)
+        descriptions = {kind: _table(arm).model_fields["kind"].description or "" for kind, arm in arms.items()}
+        choices = {f"<{kind}>": handler.generate_schema(arm) for kind, arm in arms.items()}
+        union = core_schema.tagged_union_schema(choices, by_kind)
+        return core_schema.no_info_before_validator_function(partial(self.check, descriptions=descriptions), union)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         tables = handler(schema)
@@ -391,58 +405,52 @@ class Kinds:
     def check(self, value: Any, descriptions: Mapping[str, str]) -> Any:
         """`descriptions`: of each kind, from the schema."""
         if isinstance(value, Table):
-            if getattr(value, "kind", None) not in self.names:
-                self._refuse_table(f"a {type(value).__name__}")
+            if getattr(value, "kind", None) not in descriptions:
+                self._refuse_table(descriptions, f"a {type(value).__name__}")
             return value
         if isinstance(value, str):
             value = {"kind": value}
         if not isinstance(value, Mapping):
-            self._refuse_table(None)
+            self._refuse_table(descriptions, None)
         if "kind" not in value:
             implied = [kind for key, kind in self.implied if key in value]
             value = {"kind": implied[0], **value} if implied else value
         kind = value.get("kind")
-        expected = f"one of: {', '.join(self.names)}"
+        expected = f"one of: {', '.join(descriptions)}"
         if kind is None:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
-        elif kind not in self.names:
+        elif kind not in list(descriptions):  # it may be a list or a table
             fix = dict(self.gone).get(str(kind)) or nearest(str(kind), descriptions) or "write one of these"
             refuse([Finding(("kind",), expected, fix)])
         return value
 
-    def _refuse_table(self, given: str | None) -> NoReturn:
-        expected = f"a table with kind: {' | '.join(self.names)}"
-        refuse([Finding((), expected, f"write {{kind: {self.names[0]}, ...}}", given)])
+    def _refuse_table(self, kinds: Iterable[str], given: str | None) -> NoReturn:
+        first = next(iter(kinds))
+        refuse([Finding((), f"a table with kind: {' | '.join(kinds)}", f"write {{kind: {first}, ...}}", given)])
         raise AssertionError("unreachable: refuse raises when there is a finding")
 
 
 @dataclass(frozen=True)
-class Renamed:
+class Renamed(Reading):
     """Annotation of a word that was renamed: its former names are read, with a note of what each is called today."""
 
     now: Mapping[str, str]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.today, handler(source))
-
-    def today(self, value: Any) -> Any:
+    def function(self, value: Any) -> Any:
         return self.now.get(value, value) if isinstance(value, str) else value
 
 
 @dataclass(frozen=True)
-class PlainNumber:
+class PlainNumber(Reading):
     """Annotation of a table for which a bare number may stand: ``2.0`` is ``{key: 2.0}``, for each of the keys."""
 
     keys: tuple[str, ...]
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.expand, handler(source))
-
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"anyOf": [handler(schema), {"type": "number", "description": f"short for {self._table()}"}]}
 
-    def expand(self, value: Any) -> Any:
+    def function(self, value: Any) -> Any:
         value = unwrap(value)
         if not isinstance(value, int | float) or isinstance(value, bool):
             return value
@@ -456,6 +464,9 @@ class PlainNumber:
 
 # What a word that the schema does not know may have meant: by its spelling, or by descriptions.
 
+# What complaints about a text that is no YAML say.
+READABLE = "a text that YAML can read"
+WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
 # Of a path of Windows in double quotes, where YAML takes \n and \t for characters.
 PATHS = "write the path with /, as in C:/folder/file.csv, or in single quotes"
 MOST = 3  # so many of the schema's words are proposed at most

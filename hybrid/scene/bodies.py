@@ -7,18 +7,11 @@ the body.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    Discriminator,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    Tag,
-    model_validator,
-)
-from pydantic_core import CoreSchema, core_schema
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema
 
 from hybrid.scene.base import (
     Before,
@@ -28,11 +21,11 @@ from hybrid.scene.base import (
     NonNegative,
     Number,
     Positive,
+    Reading,
     Table,
     Vector,
     Whole,
     Words,
-    by_kind,
     numbers,
     refuse,
     turned,
@@ -158,14 +151,8 @@ class BodyShape(Table):
         return (self.length or 0.0) + 2.0 * (self.radius or 0.0)
 
 
-def carried_shape(
-    name: str, shape: BodyShape, origin: Triple, rotation: Triple,
-    turned: Callable[[Triple, Triple], Triple],
-) -> Carried:  # fmt: skip
-    """The shape of a body as an obstacle, where its origin (m) and rotation (deg) are.
-
-    turned: turns a vector by a rotation (scene.bodies).
-    """
+def carried_shape(name: str, shape: BodyShape, origin: Triple, rotation: Triple) -> Carried:
+    """The shape of a body as an obstacle, where its origin (m) and rotation (deg) are."""
     x, y, z = turned(rotation, shape.place)
     given: dict[str, Any] = {
         "at": (origin[0] + x, origin[1] + y, origin[2] + z), "friction": shape.friction,
@@ -187,7 +174,7 @@ def way_out(shape: BodyShape, start: Triple, towards: tuple[float, ...], margin:
 
     start, towards: in axes of the body.  At least 0, and never more than once through the shape.
     """
-    obstacle = carried_shape("", shape, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), lambda _, x: x)
+    obstacle = carried_shape("", shape, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     size = math.hypot(*towards)
     if not size > 0.0:
         return 0.0
@@ -212,17 +199,14 @@ ROTATION = "roll, pitch and yaw, about x, then y, then z of the inertial frame [
 SYMMETRIC = 1e-6
 
 
-class _Diagonal:
+class _Diagonal(Reading):
     """Annotation of a square matrix of numbers for which the numbers of its diagonal may stand."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.expand, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         short = {"type": "array", "prefixItems": [{"type": "number"}] * 6, "minItems": 6, "maxItems": 6}
         return {"anyOf": [handler(schema), short | {"description": "short for a diagonal matrix"}]}
 
-    def expand(self, value: Any) -> Any:
+    def function(self, value: Any) -> Any:
         value = unwrap(value)
         if isinstance(value, list | tuple) and not any(isinstance(unwrap(x), list | tuple) for x in value):
             return [[x if i == j else 0.0 for j in range(len(value))] for i, x in enumerate(value)]
@@ -330,7 +314,7 @@ class HeldBody(FixedBody):
 
     def surface(self, name: str) -> dict[str, Carried]:
         """Its shape as an obstacle by the name of the body."""
-        return {name: carried_shape(name, self.shape, self.position, self.rotation, turned)}
+        return {name: carried_shape(name, self.shape, self.position, self.rotation)}
 
 
 class FreeBody(Table):
@@ -380,7 +364,7 @@ class FreeBody(Table):
         """Its shape as an obstacle by the name of the body, where the body is first looked for; empty: it has none."""
         if self.shape is None:
             return {}
-        return {name: carried_shape(name, self.shape, self.initial_guess, self.initial_rotation, turned)}
+        return {name: carried_shape(name, self.shape, self.initial_guess, self.initial_rotation)}
 
     def place(self, place: Triple) -> Triple:
         """Where a point of the body is first looked for, inertial [m]."""
@@ -448,7 +432,5 @@ def _placed(origin: Triple, rotation: Triple, place: Triple) -> Triple:
 
 
 RigidBody = Annotated[
-    Annotated[FixedBody, Tag("<fixed>")] | Annotated[FreeBody, Tag("<free>")],
-    Discriminator(by_kind),
-    Kinds(("fixed", "free"), usual=("free",), implied=(("position", "fixed"), ("initial_guess", "free"))),
+    FixedBody | FreeBody, Kinds(usual=("free",), implied=(("position", "fixed"), ("initial_guess", "free")))
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
@@ -187,6 +187,14 @@ def _other_units(density: float, mass: float, diameter: float) -> str:
     return "check mass (kg/m) and diameter (m); without a diameter there is no volume to compare with"
 
 
+class Around(NamedTuple):
+    """What is around a line, and no key of its contact says."""
+
+    rubs_on_others: bool = False  # it touches other lines with friction
+    in_plane: bool = False  # its network has two dimensions, where lines touch themselves if that is asked
+    ends_are_set: bool = False  # from outside: no scene says how near they come to each other
+
+
 class Contact(Table):
     """What the cable touches beside the seabed: itself."""
 
@@ -200,41 +208,22 @@ class Contact(Table):
         default=0.0,
         description="coefficient of friction between parts of the cable that touch each other, with `self` [-]",
     )
-    _ends_are_set: bool = PrivateAttr(default=False)
-    _rubs_on_others: bool = PrivateAttr(default=False)
-    _in_plane: bool = PrivateAttr(default=False)
+    _around: Around = PrivateAttr(default=Around())
+
+    @property
+    def around(self) -> Around:
+        """What is known of the line from outside of this table."""
+        return self._around
 
     @property
     def rubs(self) -> bool:
         """Whether friction with itself or other lines may turn the line about its axis."""
-        return self._rubs_on_others or (self.friction > 0.0 and self.self is not False)
+        return self._around.rubs_on_others or (self.friction > 0.0 and self.self is not False)
 
-    def beside_others(self, friction: float) -> Contact:
-        """The same of a line that touches others, with this friction."""
+    def within(self, **known: bool) -> Contact:
+        """The same of a line of which more is known: keys of `Around`."""
         found = self.model_copy()
-        found._rubs_on_others = friction > 0.0
-        return found
-
-    @property
-    def in_plane(self) -> bool:
-        """Whether it is of a line of a network of two dimensions, where lines touch themselves if that is asked."""
-        return self._in_plane
-
-    def of_lines_in_plane(self) -> Contact:
-        """The same of such a line."""
-        found = self.model_copy()
-        found._in_plane = True
-        return found
-
-    @property
-    def ends_are_set(self) -> bool:
-        """Whether ends may be set from outside, so that no scene says how near they come to each other."""
-        return self._ends_are_set
-
-    def of_ends_that_are_set(self) -> Contact:
-        """The same of a line that is stepped from outside."""
-        found = self.model_copy()
-        found._ends_are_set = True
+        found._around = self._around._replace(**known)
         return found
 
 

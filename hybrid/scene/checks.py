@@ -7,13 +7,13 @@ when another table of the scene cannot be read.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any, Protocol
 
 from hybrid.scene import combinations, motion_checks, sea_checks, start_checks
-from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
+    Accuracy,
     AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
@@ -61,10 +61,14 @@ def reel_has_diameters(
     if contact.self or obstacles or soil:
         apart = "which parts of the cable keep apart (contact.self)"
         how = apart if contact.self else "with which it touches obstacles" if obstacles else "needed for soil"
-        for i, section in enumerate(getattr(ends, name).payout.reel or ()):
-            if section.diameter is None:
-                expected = f"a number > 0, in m, {how}"
-                yield Finding(("ends", name, "payout", "reel", i, "diameter"), expected, "add `diameter: ...` (m)")
+        yield from without_diameter(getattr(ends, name).payout.reel or (), ("ends", name, "payout", "reel"), how)
+
+
+def without_diameter(sections: Iterable[Section], at: Place, why: str) -> Iterator[Finding]:
+    """Sections of a list without a diameter; why: what it is for."""
+    for i, section in enumerate(sections):
+        if section.diameter is None:
+            yield Finding((*at, i, "diameter"), f"a number > 0, in m, {why}", "add `diameter: ...` (m)")
 
 
 # Contradictions between tables: each check looks at the tables its parameters name.
@@ -217,12 +221,9 @@ def _touches_itself(cable: Cable, contact: Contact) -> Iterator[Finding]:
     if contact.self is False and contact.friction > 0.0:
         expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
         yield Finding(("contact", "friction"), expected, "leave `self: false` out, or leave friction out")
-    if not contact.self:
-        return
-    for i, section in enumerate(cable.sections):
-        if section.diameter is None:
-            expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
-            yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+    if contact.self:
+        why = "which parts of the cable keep apart (contact.self)"
+        yield from without_diameter(cable.sections, ("cable", "sections"), why)
 
 
 # Of the radius of a line: how wide the section of a groove is at least in which it lies.
@@ -233,10 +234,7 @@ def _touches_obstacles(cable: Cable, obstacles: Obstacles, ends: Ends) -> Iterat
     """A line that touches obstacles has a radius, and its ends are outside of them."""
     if not obstacles:
         return
-    for i, section in enumerate(cable.sections):
-        if section.diameter is None:
-            expected = "a number > 0, in m, with which the cable touches obstacles"
-            yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+    yield from without_diameter(cable.sections, ("cable", "sections"), "with which the cable touches obstacles")
     widest = 0.5 * max(section.diameter or 0.0 for section in cable.sections)
     for name, x in obstacles.items():
         if isinstance(x, SheaveObstacle) and x.groove < LEAST_GROOVE * widest:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AliasChoices, Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import AliasChoices, Field, PrivateAttr, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape, sphere_diameter
 from hybrid.scene.base import (
@@ -29,7 +29,6 @@ from hybrid.scene.base import (
     Truth,
     Vector,
     Words,
-    by_kind,
     numbers,
     parallel,
     refuse,
@@ -444,15 +443,7 @@ class Body(EndTable):
         return self.height if self.height is not None else sphere_diameter(self.volume)
 
 
-End = Annotated[
-    Annotated[Pinned, Tag("<pinned>")]
-    | Annotated[Clamped, Tag("<clamped>")]
-    | Annotated[Guided, Tag("<guided>")]
-    | Annotated[Free, Tag("<free>")]
-    | Annotated[Body, Tag("<body>")],
-    Discriminator(by_kind),
-    Kinds(("pinned", "clamped", "guided", "free", "body"), usual=("pinned",)),
-]
+End = Annotated[Pinned | Clamped | Guided | Free | Body, Kinds(usual=("pinned",))]
 
 
 class Ends(Table):

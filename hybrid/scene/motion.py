@@ -26,7 +26,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,9 +36,9 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.motion_file import (
     Record,
     RecordRefused,
-    check_file,
     continuous,
     netcdf_reader,
+    read_once,
     read_record,
     read_table,
     spline,
@@ -53,18 +52,10 @@ COLUMNS = ("frequency", "heading", *FREEDOMS, *(f"{name}_phase" for name in FREE
 SAME_HEADING = 1e-6
 
 
+@read_once(4)
 def read_rao(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
     """Frequencies (F,) rad/s, headings (H,) deg, and the response (F, H, 6) per metre (m, rad).  RecordRefused."""
-    check_file(path)
-    status = Path(path).stat()
-    return _read(path, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=4)
-def _read(
-    path: str, _changed: int, _size: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
-    if is_dataset(path):
+    if Path(path).suffix.lower() in NETCDF:
         return read_dataset(path)
     name = Path(path).name
     header, table, lines = read_table(path, _checked_header)
@@ -279,11 +270,6 @@ def _solved(data: Any, along: str, name: str) -> NDArray[np.complex128]:
     except np.linalg.LinAlgError:
         raise RecordRefused("a body that something holds or that has mass", WHY, f"{name}: no response") from None
     return np.asarray(np.swapaxes(found, 1, 2), complex)
-
-
-def is_dataset(path: str) -> bool:
-    """Whether a file is netCDF, by its name."""
-    return Path(path).suffix.lower() in NETCDF
 
 
 Array = NDArray[np.float64]

@@ -1,7 +1,6 @@
 """Whether prescribed motions can be computed.
 
 They start from rest, are smooth, no faster than a cable can follow, and resolved by the time step.
-Files are read only if a scene has one, and numpy is imported only then.
 """
 
 from __future__ import annotations
@@ -16,11 +15,13 @@ from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import End, Ends, Triple
+from hybrid.scene.motion import EndMotion, motion_record, read_rao
 from hybrid.scene.motion_file import (
     MISSED,
     Record,
     RecordRefused,
     fastest_in,
+    judge_record,
     missed_between,
     read_history,
     read_record,
@@ -67,28 +68,19 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
     step = time.step if isinstance(time, Time) else None
     found: list[Finding] = []
     late: list[Finding] = []  # about the time step; left out where the motion itself is wrong
-    for here, end, motion in _motions(ends):
+    for here, moved, motion in [*_motions(ends), *_obstacles(tables.get("obstacles"))]:
         record, wrong = None, list(_harmonic_jump(motion))
         if motion.file is not None:
-            record, wrong = _judged(end, motion, time.duration if isinstance(time, Time) else None)
+            record, wrong = _judged(moved, motion, time.duration if isinstance(time, Time) else None)
         if motion.vessel is not None:
-            wrong += _vessel(end, motion.vessel)
-        if not wrong and isinstance(cable, Cable):
+            wrong += _vessel(moved, motion.vessel)
+        if not wrong and isinstance(cable, Cable) and not isinstance(moved, Held):
             wrong = list(_too_fast(cable, motion, record))
-            wrong += moved_into_the_ground(end, motion, record, time, environment, cable.length)
+            wrong += moved_into_the_ground(moved, motion, record, time, environment, cable.length)
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
         if step is not None and not wrong:
             late += _unresolved(here, motion, record, environment, step)
-    for place, held in _obstacles(tables.get("obstacles")):
-        record, wrong = None, list(_harmonic_jump(held.motion))
-        if held.motion.file is not None:
-            record, wrong = _judged(held, held.motion, time.duration if isinstance(time, Time) else None)
-        if held.motion.vessel is not None:
-            wrong += _vessel(held, held.motion.vessel)
-        found += [Finding((*place, *f.at), f.expected, f.fix, f.given) for f in wrong]
-        if step is not None and not wrong:
-            late += _unresolved(place, held.motion, record, environment, step)
-            late += _fast_period(list(_periods(place, held.motion)), step)
+            late += _fast_period(here, motion, step) if isinstance(moved, Held) else ()
     if step is not None:
         late += _fast_spins(tables.get("obstacles"), step)
     for wrong_load in load_findings(ends, step):
@@ -106,10 +98,10 @@ class Held(NamedTuple):
     held_tangent: tuple[float, float, float] | None
 
 
-def _obstacles(obstacles: Obstacles | None) -> list[tuple[tuple[str, ...], Held]]:
-    """Place, and what moves by which motion, of the obstacles that do."""
+def _obstacles(obstacles: Obstacles | None) -> list[tuple[tuple[str, ...], End | Held, Motion]]:
+    """Place, what moves and motion of the obstacles that do."""
     return [
-        (("obstacles", name, "motion"), Held(x.motion, x.at, (1.0, 0.0, 0.0)))
+        (("obstacles", name, "motion"), Held(x.motion, x.at, (1.0, 0.0, 0.0)), x.motion)
         for name, x in (obstacles or {}).items()
         if x.motion is not None
     ]
@@ -129,15 +121,15 @@ def _fast_spins(obstacles: Obstacles | None, step: float) -> Iterator[Finding]:
             yield Finding(("obstacles", name, "spin", "ramp"), expected, "a longer ramp", f"{spin.ramp:g}")
 
 
-def _fast_period(periods: list[tuple[str, str, Harmonic]], step: float) -> Iterator[Finding]:
+def _fast_period(here: Place, motion: Motion, step: float) -> Iterator[Finding]:
     """A harmonic that a time step does not resolve."""
-    for where, _, h in periods:
+    for where, _, h in _periods(here, motion):
         if h.period < SAMPLES * step * (1 - 1e-9):
             expected = f"at most a sixth of the period of {where}, {_rounded_down(h.period / SAMPLES)} s"
             yield Finding(("time", "step"), expected, f"time.step: {h.period / 20:.3g}, or less", f"{step:g}")
 
 
-def _motions(ends: Ends) -> list[tuple[tuple[str, ...], End, Motion]]:
+def _motions(ends: Ends) -> list[tuple[tuple[str, ...], End | Held, Motion]]:
     """Place, end and motion of the ends that are moved."""
     return [
         (("ends", name, "motion"), end, end.prescribed_motion)
@@ -168,9 +160,6 @@ def _harmonic_jump(motion: Motion) -> Iterator[Finding]:
 
 def _judged(end: End | Held, motion: Motion, duration: float | None) -> tuple[Record | None, list[Finding]]:
     """A motion file, if it can be read, and what is wrong with it."""
-    from hybrid.scene.motion import motion_record
-    from hybrid.scene.motion_jumps import judge_record
-
     try:
         record = motion_record(motion, end.held_position, end.held_tangent is not None)
     except RecordRefused as refused:
@@ -189,8 +178,6 @@ def _judged(end: End | Held, motion: Motion, duration: float | None) -> tuple[Re
 
 def _vessel(end: End | Held, vessel: Vessel) -> Iterator[Finding]:
     """A vessel whose table cannot be read, or whose fairlead is not where the end is held."""
-    from hybrid.scene.motion import read_rao
-
     try:
         if vessel.rao is not None:
             read_rao(vessel.rao)
@@ -262,8 +249,7 @@ def _all_periods(ends: Ends, environment: Environment | None) -> dict[str, float
 
 def moved_in(ends: Ends | None, obstacles: Obstacles | None = None) -> list[tuple[End | Held, Motion]]:
     """The ends and obstacles that are moved, with their motions."""
-    found: list[tuple[End | Held, Motion]] = [(x, motion) for _, x, motion in (_motions(ends) if ends else ())]
-    return found + [(held, held.motion) for _, held in _obstacles(obstacles)]
+    return [(x, motion) for _, x, motion in [*(_motions(ends) if ends else ()), *_obstacles(obstacles)]]
 
 
 def lasting_period(moved: Iterable[tuple[End | Held, Motion]], environment: Environment | None) -> float:
@@ -273,8 +259,6 @@ def lasting_period(moved: Iterable[tuple[End | Held, Motion]], environment: Envi
     for end, motion in moved:
         times += [h.period for _, _, h in _periods((), motion)]
         if motion.file is not None:
-            from hybrid.scene.motion import motion_record
-
             times.append(shortest_in(motion_record(motion, end.held_position, end.held_tangent is not None)))
     return min(times, default=math.inf)
 
@@ -416,7 +400,6 @@ def _unreadable(load: GivenLoad) -> Finding | None:
     """Why the file of a load cannot be used."""
     if load.load.file is None:
         return None
-
     try:
         read_history(load.load.file)
     except RecordRefused as refused:
@@ -502,8 +485,6 @@ def moved_into_the_ground(
     sunk = deepest_place(bed, depth)
     if place[2] - bed.height(*place[:2]) < -sunk or not _may_reach(place, motion, record, time, bed.is_level, bed.z):
         return  # complained of already, or far above it
-    from hybrid.scene.motion import EndMotion
-
     moving = EndMotion(motion, place)
     deepest, when, there = 0.0, 0.0, place
     for t in _times(motion, record, time):

@@ -30,6 +30,7 @@ from hybrid.scene.base import (
     table_or_list,
     value_or_table,
 )
+from hybrid.scene.motion_file import RecordRefused, read_history
 
 Triple = tuple[float, float, float]
 Row = tuple[float, float, float, float]  # s, N or N m (3)
@@ -106,8 +107,6 @@ class GivenLoad:
         """The rows (t, x, y, z) of a history; none of a constant load, or of a file that cannot be read."""
         if self.load.file is None:
             return self.load.history or ()
-        from hybrid.scene.motion_file import RecordRefused, read_history  # numpy, for scenes that need it
-
         try:
             return read_history(self.load.file)
         except RecordRefused:
@@ -179,7 +178,16 @@ class Travel(Table):
     begin: NonNegative = Field(default=0.0, description="time at which it begins [s]")
 
 
-class Drift(Table):
+class _Harmonics(Table):
+    """What has harmonics by the names of degrees of freedom."""
+
+    def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
+        """Those that are given, by name; one that is no list is a tuple of one."""
+        named = {name: getattr(self, name) for name in (*SHIFTS, *TURNS)}
+        return {n: (x,) if isinstance(x, Harmonic) else x for n, x in named.items() if x is not None}
+
+
+class Drift(_Harmonics):
     """Slow motion of a vessel about where it stands, in its axes, each a harmonic or a list whose sum is meant.
 
     To first order, as the RAO; it grows with the ramp of the waves.
@@ -191,11 +199,6 @@ class Drift(Table):
     roll: Harmonics | None = Field(default=None, description="about the axis to the bow, which carries port up")
     pitch: Harmonics | None = Field(default=None, description="about the axis to port, which carries the bow down")
     yaw: Harmonics | None = Field(default=None, description="about the axis up, which carries the bow to port")
-
-    def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
-        """Those that are given, by name."""
-        named = {name: getattr(self, name) for name in (*SHIFTS, *TURNS)}
-        return {n: (x,) if isinstance(x, Harmonic) else x for n, x in named.items() if x is not None}
 
 
 class Vessel(Table):
@@ -232,7 +235,7 @@ class Vessel(Table):
         return self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y, self.origin[2] + z
 
 
-class Motion(Table):
+class Motion(_Harmonics):
     """Prescribed motion of an end, relative to where it is held; it must start from rest, or have a `ramp`.
 
     What is given adds up; only a file stands alone.
@@ -263,15 +266,6 @@ class Motion(Table):
         "degrees) in any order; relative to the scene file; it starts at rest where the end is, or `ramp` blends it "
         "in; with `vessel` it is of the vessel: place of its origin and its attitude, inertial",
     )
-
-    def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
-        """The harmonic motions that are given, by name; one that is no list is a tuple of one."""
-        named = {name: getattr(self, name) for name in (*SHIFTS, *TURNS)}
-        return {
-            name: (given,) if isinstance(given, Harmonic) else given
-            for name, given in named.items()
-            if given is not None
-        }
 
     def shifts(self) -> list[str]:
         """The keys given that move the end; those of TURNS turn it, and a file may do both."""

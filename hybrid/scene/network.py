@@ -15,9 +15,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
 from hybrid.scene.analysis import (
+    USUAL,
+    Accuracy,
     AdaptiveModel,
+    AskedAccuracy,
     CatenaryModel,
     Equilibrium,
     Initial,
@@ -30,6 +32,7 @@ from hybrid.scene.analysis import (
     RodModel,
     Straight,
     Time,
+    of_unnamed_model,
     without_friction,
 )
 from hybrid.scene.attachments import Attachment
@@ -547,9 +550,9 @@ class Network(SceneTables, Asked):
     def _contact_of(self, name: str) -> Contact:
         """Contact of a line with itself, which knows whether it rubs on others."""
         own = self.lines[name].contact
-        own = own.of_lines_in_plane() if self.dimension == 2 else own
+        own = own.within(in_plane=True) if self.dimension == 2 else own
         touches = self.contact is not None and any(name in pair for pair in self.touching_pairs)
-        return own.beside_others(self.contact.friction) if self.contact is not None and touches else own
+        return own.within(rubs_on_others=self.contact.friction > 0.0) if self.contact is not None and touches else own
 
     def _accuracy_of(self, line: JoinedLine) -> Accuracy | None:
         """What is asked of a line: of one that names no model no curvature, because nobody has asked for a rod."""

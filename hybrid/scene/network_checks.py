@@ -12,7 +12,7 @@ from typing import Any
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import Finding, Place, nearest
 from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.checks import contradictions, elevation_has_waves
+from hybrid.scene.checks import contradictions, elevation_has_waves, without_diameter
 from hybrid.scene.combinations import holds_rod, refused, tables_of
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
@@ -147,10 +147,8 @@ def _touching_findings(system: Network) -> Iterator[Finding]:
         expected = "nothing, because there is one line; whether it touches itself is asked by lines.NAME.contact"
         yield Finding(("contact",), expected, "leave it out")
     for name in dict.fromkeys(x for pair in system.touching_pairs for x in pair):
-        for i, section in enumerate(system.lines[name].sections):
-            if section.diameter is None:
-                expected = "a number > 0, in m, which lines that touch each other keep apart (contact)"
-                yield Finding(("lines", name, "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+        why = "which lines that touch each other keep apart (contact)"
+        yield from without_diameter(system.lines[name].sections, ("lines", name, "sections"), why)
 
 
 def _body_findings(system: Network, name: str) -> Iterator[Finding]:

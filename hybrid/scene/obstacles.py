@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from operator import mul
-from typing import Annotated, Literal, Self
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from hybrid.scene.base import (
     Before,
@@ -21,15 +25,17 @@ from hybrid.scene.base import (
     Text,
     Vector,
     Words,
-    by_kind,
     numbers,
     refuse,
     turned,
     unit,
 )
-from hybrid.scene.motion_file import readable
+from hybrid.scene.motion_file import LARGEST, RecordRefused, read_once, readable
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.points import Name
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 _FRICTION = "coefficient of friction (Coulomb) of the line on it, in every direction [-]"
 _STIFFNESS = (
@@ -232,6 +238,248 @@ class SheaveObstacle(_Turning):
         return max(self.groove - math.hypot(out, along), along - self.groove - 2.0 * self.rim)
 
 
+# Surfaces of triangles from STL files (text and binary) and OBJ files, checked to be closed and turned outwards.
+
+WHAT, REPAIR = "an STL or OBJ file", "repair the mesh in the program that wrote it"
+# Facets that a scene can do with; of its longest edge, how high a triangle is at least whose normal can be told.
+MOST_FACETS, FLATTEST = 200_000, 1e-6
+# Of a binary STL file: bytes before the facets, and of each.
+HEADER, RECORD = 84, 50
+
+
+class Mesh(NamedTuple):
+    """A closed surface: places (V, 3) in units of the file, and triangles (F, 3) of them, turned outwards.
+
+    Fans of triangles that touch at a place only have a corner each there.
+    """
+
+    points: Array
+    triangles: Whole
+
+
+class _Soup(NamedTuple):
+    """Triangles as a file has them: corners (F, 3, 3), and where each stands in the file."""
+
+    name: str
+    corners: Array
+    lines: list[int]  # empty: of a binary file
+
+    def place(self, k: int) -> str:
+        """Where facet k is: number, line, middle."""
+        x, y, z = self.corners[k].mean(axis=0)
+        line = f", line {self.lines[k]}" if self.lines else ""
+        return f"{self.name}, facet {k + 1}{line} (near {x:.6g}, {y:.6g}, {z:.6g})"
+
+
+@read_once(8, WHAT)
+def read_mesh(path: str) -> Mesh:
+    """The surface of a file; RecordRefused says what is wrong with it, and where."""
+    name, suffix = Path(path).name, Path(path).suffix.lower()
+    if suffix not in (".stl", ".obj"):
+        raise RecordRefused(WHAT, "name it *.stl or *.obj as what it is", name)
+    try:
+        data = Path(path).read_bytes()
+    except OSError:
+        raise RecordRefused(WHAT, "check the path", f"{path}, which cannot be read") from None
+    size = len(data)
+    if suffix == ".obj":
+        soup = _from_obj(name, data.decode("utf-8-sig", "replace").splitlines())
+    elif size >= HEADER and size == HEADER + RECORD * int.from_bytes(data[80:HEADER], "little"):
+        soup = _from_binary(name, data)
+    elif data.lstrip()[:5].lower() == b"solid":
+        soup = _from_text(name, data.decode("utf-8-sig", "replace").splitlines())
+    else:
+        given = f"{name}, {size} bytes"
+        if size >= HEADER:
+            facets = int.from_bytes(data[80:HEADER], "little")
+            given = f"{given}, where {facets} facets would take {HEADER + RECORD * facets}"
+        raise RecordRefused("an STL file, text that begins with solid or binary", "write it anew", given)
+    if not len(soup.corners):
+        raise RecordRefused("at least 4 triangles", "export the surface, not the curves", f"{name}, which has none")
+    if len(soup.corners) > MOST_FACETS:
+        given = f"{name}, {len(soup.corners)} facets"
+        raise RecordRefused(f"at most {MOST_FACETS} facets", "decimate the mesh to what a line can feel", given)
+    return _closed(soup)
+
+
+def _numbers(name: str, line: int, words: list[str]) -> tuple[float, ...]:
+    """Three coordinates of a line."""
+    try:
+        found = tuple(float(x) for x in words[:3])
+    except ValueError:
+        found = ()
+    if len(found) < 3:
+        given = f"{name}, line {line}: {' '.join(words)[:60]!r}"
+        raise RecordRefused("three coordinates", "write them as 1.5 -2e-3 0", given)
+    return found
+
+
+def _from_binary(name: str, data: bytes) -> _Soup:
+    """Facets of a binary STL file: normal, three corners, two bytes more, each."""
+    records = np.frombuffer(data[HEADER:], dtype=np.dtype([("x", "<f4", (4, 3)), ("more", "<u2")]))
+    return _Soup(name, np.asarray(records["x"][:, 1:], float), [])
+
+
+def _from_text(name: str, rows: list[str]) -> _Soup:
+    """Facets of an STL file as text: corners between `outer loop` and `endloop`."""
+    corners: list[tuple[float, ...]] = []
+    lines: list[int] = []
+    begun = 0
+    for k, row in enumerate(rows, start=1):
+        words = row.split()
+        key = words[0].lower() if words else ""
+        if key == "facet":
+            if begun:
+                raise RecordRefused("endfacet before the next facet", REPAIR, f"{name}, line {k}")
+            begun = k
+            lines.append(k)
+        elif key == "vertex":
+            corners.append(_numbers(name, k, words[1:]))
+        elif key == "endfacet":
+            if len(corners) != 3 * len(lines) or not begun:
+                raise RecordRefused("three lines `vertex x y z` in a facet", REPAIR, f"{name}, line {begun or k}")
+            begun = 0
+    if begun:
+        raise RecordRefused("endfacet", "the file is cut off: write it anew", f"{name}, line {begun}")
+    return _Soup(name, np.array(corners, float).reshape(-1, 3, 3), lines)
+
+
+def _from_obj(name: str, rows: list[str]) -> _Soup:
+    """Triangles of an OBJ file; polygons with more corners as fans from their first."""
+    places: list[tuple[float, ...]] = []
+    found: list[tuple[int, int, int]] = []
+    lines: list[int] = []
+    for k, row in enumerate(rows, start=1):
+        words = row.partition("#")[0].split()
+        if not words or words[0] not in ("v", "f"):
+            continue
+        if words[0] == "v":
+            places.append(_numbers(name, k, words[1:]))
+            continue
+        at = []
+        for word in words[1:]:
+            number = int(x) if re.fullmatch(r"-?\d{1,9}", x := word.partition("/")[0]) else 0
+            number += len(places) if number < 0 else -1
+            if not 0 <= number < len(places):
+                given = f"{name}, line {k}: {word[:30]!r}"
+                expected = f"the number of one of the {len(places)} places before, from 1, or from -1 back"
+                raise RecordRefused(expected, "write v before f", given)
+            at.append(number)
+        if len(at) < 3:
+            raise RecordRefused("at least three corners", REPAIR, f"{name}, line {k}: {row.strip()[:60]!r}")
+        found += [(at[0], at[j], at[j + 1]) for j in range(1, len(at) - 1)]
+        lines += [k] * (len(at) - 2)
+    corners = np.array(places, float).reshape(-1, 3)[np.array(found, int).reshape(-1, 3)]
+    return _Soup(name, corners, lines)
+
+
+def _closed(soup: _Soup) -> Mesh:
+    """The surface that triangles make: each edge between two of them, turned alike, and all of them outwards."""
+    for k in np.flatnonzero(~(np.abs(soup.corners) <= LARGEST).all(axis=(1, 2)))[:1]:
+        raise RecordRefused(f"coordinates up to {LARGEST:g}", REPAIR, soup.place(k))
+    points, of = np.unique(soup.corners.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)
+    triangles = of.reshape(-1, 3)
+    whole = np.array([triangles[:, k] != triangles[:, (k + 1) % 3] for k in range(3)]).all(axis=0)
+    kept = np.flatnonzero(whole)  # one with two corners in a place has no surface, and its neighbours meet without it
+    triangles, x = triangles[kept], points[triangles[kept]]
+    sides = x[:, [1, 2, 0]] - x
+    longest = np.linalg.norm(sides, axis=2).max(axis=1)
+    height = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / longest
+    for k in np.flatnonzero(height < FLATTEST * longest)[:1]:
+        given = f"{soup.place(kept[k])}: {height[k]:.2g} high over an edge of {longest[k]:.4g}"
+        raise RecordRefused(f"triangles at least {FLATTEST:g} of their longest edge high", REPAIR, given)
+    if not len(triangles):
+        raise RecordRefused("at least 4 triangles", REPAIR, f"{soup.name}, which has none with an area")
+    other = _across(soup, triangles, kept)
+    _refuse_inside_out(soup, x, other, kept)
+    return _with_fans(points, triangles, other)
+
+
+def _across(soup: _Soup, triangles: Whole, kept: Whole) -> Whole:
+    """The triangle (F, 3) on the other side of each edge, from corner k to k + 1; RecordRefused where it is not one."""
+    begin, end = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    size, facet = int(triangles.max()) + 1, np.repeat(np.arange(len(triangles)), 3)
+    there, back = begin * size + end, end * size + begin
+    order = np.argsort(there, kind="stable")
+    rising = there[order]
+    twice = np.flatnonzero(np.diff(rising) == 0)
+    if twice.size:
+        a, b = sorted(facet[order[twice[0] : twice[0] + 2]].tolist())
+        expected = "triangles that all go counter-clockwise around their outside, two at every edge"
+        fix = "make the normals of the mesh consistent, and leave out triangles that are there twice"
+        given = f"{soup.place(kept[b])}, which goes along an edge in the same direction as facet {kept[a] + 1}"
+        raise RecordRefused(expected, fix, given)
+    at = np.minimum(np.searchsorted(rising, back), rising.size - 1)
+    open_ = np.flatnonzero(rising[at] != back)
+    if open_.size:
+        k = int(open_[0])
+        a, b = (", ".join(f"{c:.6g}" for c in soup.corners[kept[facet[k]], j % 3]) for j in (k % 3, k % 3 + 1))
+        given = f"{soup.place(kept[facet[k]])}: nothing beside its edge from ({a}) to ({b}); {open_.size} such edges"
+        fix = "close the hole, or merge places that should be one; give a sheet its thickness"
+        raise RecordRefused("a closed surface", fix, given)
+    return np.asarray(facet[order[at]]).reshape(-1, 3)
+
+
+def _refuse_inside_out(soup: _Soup, x: Array, other: Whole, kept: Whole) -> None:
+    """RecordRefused: a shell whose inside is its front, and which is no hollow of another; x: (F, 3, 3)."""
+    count, shell = _parts(len(x), np.repeat(np.arange(len(x)), 3), other.ravel())
+    p, q, r = np.moveaxis(x - 0.5 * (x.min(axis=(0, 1)) + x.max(axis=(0, 1))), 1, 0)
+    volume = np.bincount(shell, np.einsum("ij,ij->i", p, np.cross(q, r)) / 6.0, count)
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, shell, x.min(axis=1))
+    np.maximum.at(high, shell, x.max(axis=1))
+    for k in np.flatnonzero(volume <= 0.0).tolist():
+        around = (volume > -volume[k]) & (low <= low[k]).all(axis=1) & (high >= high[k]).all(axis=1)
+        if not (volume[k] < 0.0 and around.any()):
+            given = f"{soup.place(kept[int(np.argmax(shell == k))])}, on a shell whose volume is {volume[k]:.4g}"
+            expected = "triangles that go counter-clockwise seen from outside"
+            raise RecordRefused(expected, "turn the surface over (flip its normals)", given)
+
+
+def _parts(count: int, a: Whole, b: Whole) -> tuple[int, Whole]:
+    """Into how many parts pairs (a, b) of `count` things connect them, and the part (count,) of each."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    found = connected_components(coo_array((np.ones(a.size), (a, b)), (count, count)), directed=False)
+    return int(found[0]), np.asarray(found[1])
+
+
+def _with_fans(points: Array, triangles: Whole, other: Whole) -> Mesh:
+    """The surface with a place for each fan of triangles around one."""
+    corner = (triangles[other] == triangles[..., None]).argmax(axis=2)  # the same place in the triangle across
+    here = np.arange(3 * len(triangles))
+    fan = _parts(here.size, here, (3 * other + corner).ravel())[1]
+    first = np.unique(fan, return_index=True)[1]
+    return Mesh(points[triangles.ravel()[first]], fan.reshape(-1, 3).astype(np.int64))
+
+
+def distance_to(mesh: Mesh, x: tuple[float, float, float]) -> float:
+    """Distance of a place to a surface, negative within, in units of the file.
+
+    All triangles are looked at, and the solid angles under which they are seen tell what is within.
+    """
+    corners = np.moveaxis(mesh.points[mesh.triangles] - np.array(x), 1, 0)
+    sides = [(corners[k], corners[(k + 1) % 3] - corners[k]) for k in range(3)]
+    n = np.cross(sides[0][1], sides[1][1])
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    height = _dots(corners[0], n)
+    within = np.all([_dots(np.cross(side, height[:, None] * n - p), n) >= 0.0 for p, side in sides], axis=0)
+    least = np.where(within, np.abs(height), np.inf)
+    for p, side in sides:
+        part = np.clip(-_dots(p, side) / _dots(side, side), 0.0, 1.0)
+        least = np.minimum(least, np.linalg.norm(p + part[:, None] * side, axis=1))
+    a, b, c = corners
+    la, lb, lc = np.linalg.norm(corners, axis=2)
+    over = la * lb * lc + _dots(a, b) * lc + _dots(b, c) * la + _dots(c, a) * lb
+    half_angle = np.arctan2(_dots(a, np.cross(b, c)), over).sum()  # of what is seen of it: 2 pi within
+    return float(-least.min() if half_angle > np.pi else least.min())
+
+
+def _dots(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
 class MeshObstacle(_Rotated):
     """A closed surface of triangles: a hull, structure or fairlead as it is drawn, with sharp edges."""
 
@@ -246,16 +494,12 @@ class MeshObstacle(_Rotated):
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
-        from hybrid.scene.mesh_file import WHAT, read_mesh
-
         with readable(self.file, WHAT):
             read_mesh(self.file)
         return self
 
     def distance(self, x: tuple[float, float, float]) -> float:
         """Distance [m] of a place to the surface; negative within the solid."""
-        from hybrid.scene.mesh_file import distance_to, read_mesh
-
         w = [(p - q) / self.scale for p, q in zip(x, self.at, strict=True)]
         u, v, z = (sum(map(mul, w, a)) for a in self.axes)
         return self.scale * distance_to(read_mesh(self.file), (u, v, z))
@@ -271,16 +515,8 @@ def _about(
 
 
 Obstacle = Annotated[
-    Annotated[PlaneObstacle, Tag("<plane>")]
-    | Annotated[SphereObstacle, Tag("<sphere>")]
-    | Annotated[CylinderObstacle, Tag("<cylinder>")]
-    | Annotated[BoxObstacle, Tag("<box>")]
-    | Annotated[TorusObstacle, Tag("<torus>")]
-    | Annotated[SheaveObstacle, Tag("<sheave>")]
-    | Annotated[MeshObstacle, Tag("<mesh>")],
-    Discriminator(by_kind),
+    PlaneObstacle | SphereObstacle | CylinderObstacle | BoxObstacle | TorusObstacle | SheaveObstacle | MeshObstacle,
     Kinds(
-        ("plane", "sphere", "cylinder", "box", "torus", "sheave", "mesh"),
         usual=("cylinder",),
         implied=(
             ("normal", "plane"),

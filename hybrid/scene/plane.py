@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hybrid.scene.analysis import Initial, Points, Straight
-from hybrid.scene.base import Finding, Place, unit
+from hybrid.scene.base import Finding, Place, cross, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.combinations import PLANE, refused
 from hybrid.scene.ends import End, Ends, Triple
@@ -51,7 +51,7 @@ class Plane:
 
     @property
     def normal(self) -> Triple:
-        return _cross(self.p, self.q)
+        return cross(self.p, self.q)
 
     def text(self) -> str:
         """What it is, for people."""
@@ -96,17 +96,17 @@ def _choose(witnesses: list[Witness], origin: Triple, vertical: bool) -> Plane:
     if not ways:
         ways = [(1.0, 0.0, 0.0)]
     first = ways[0]
-    sines = [math.hypot(*_cross(first, v)) for v in ways]
+    sines = [math.hypot(*cross(first, v)) for v in ways]
     telling = [v for v, sine in zip(ways, sines, strict=True) if sine > SAYS_NOTHING]
     if not telling and max(sines) > TYPED:
         telling = [ways[sines.index(max(sines))]]
     if telling:
         second = telling[0]
     elif normals:  # a straight line under an end moment bends about it
-        second = _cross(normals[0], first)
+        second = cross(normals[0], first)
     else:
         second = (1.0, 0.0, 0.0) if abs(first[0]) < 0.9 else UP
-    if not math.hypot(*_cross(first, second)) > 0.0:  # a moment along the line: any plane is as wrong as another
+    if not math.hypot(*cross(first, second)) > 0.0:  # a moment along the line: any plane is as wrong as another
         second = (1.0, 0.0, 0.0) if abs(first[0]) < 0.9 else UP
     if vertical:
         level = unit((second[0], second[1], 0.0))
@@ -123,7 +123,7 @@ def _leaves(
     for w in witnesses:
         v = _minus(w.vector, origin) if w.kind == "place" else w.vector
         size = length if w.kind == "place" else math.hypot(*v)
-        out = abs(v[0] * n[0] + v[1] * n[1] + v[2] * n[2]) if w.kind != "normal" else math.hypot(*_cross(v, n))
+        out = abs(v[0] * n[0] + v[1] * n[1] + v[2] * n[2]) if w.kind != "normal" else math.hypot(*cross(v, n))
         if out > tolerance * size:
             what = "a vector in" if w.kind == "along" else "a place in" if w.kind == "place" else "a vector normal to"
             expected = f"{what} {plane.text()}, which the rest of the scene lies in, because dimension is 2"
@@ -166,7 +166,7 @@ def _director(end: End, plane: Plane) -> tuple[float, float] | None:
     along = sum(a * b for a, b in zip(end.held_normal, t, strict=True))
     a = unit(_minus(end.held_normal, (along * t[0], along * t[1], along * t[2])))
     n = plane.normal
-    m = _cross(n, t)
+    m = cross(n, t)
     return sum(x * y for x, y in zip(a, n, strict=True)), sum(x * y for x, y in zip(a, m, strict=True))
 
 
@@ -286,7 +286,3 @@ def _given(v: Triple) -> str:
 
 def _minus(a: Triple, b: Triple) -> Triple:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def _cross(a: Triple, b: Triple) -> Triple:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

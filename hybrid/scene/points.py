@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import (
@@ -20,7 +20,6 @@ from hybrid.scene.base import (
     Text,
     Truth,
     Vector,
-    by_kind,
     parallel,
     refuse,
 )
@@ -165,13 +164,8 @@ class Fairlead(Table):
 
 
 Point = Annotated[
-    Annotated[FixedPoint, Tag("<fixed>")]
-    | Annotated[FreePoint, Tag("<free>")]
-    | Annotated[GuidedPoint, Tag("<guided>")]
-    | Annotated[Fairlead, Tag("<fairlead>")],
-    Discriminator(by_kind),
+    FixedPoint | FreePoint | GuidedPoint | Fairlead,
     Kinds(
-        ("fixed", "free", "guided", "fairlead"),
         usual=("fixed",),
         implied=(("position", "fixed"), ("initial_guess", "free"), ("body", "fairlead")),
     ),
@@ -222,10 +216,8 @@ class ClampedConnection(Table):
 
 
 Connection = Annotated[
-    Annotated[PinnedConnection, Tag("<pinned>")] | Annotated[ClampedConnection, Tag("<clamped>")],
-    Discriminator(by_kind),
+    PinnedConnection | ClampedConnection,
     Kinds(
-        ("pinned", "clamped"),
         usual=("clamped",),
         implied=(
             *((key, "clamped") for key in ("tangent", "normal", "turns", "swivel", "bend_stiffness")),

@@ -127,13 +127,11 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
-def one_line(scene: Scene, file: str = "") -> LineScene:
+def one_line(scene: Scene) -> LineScene:
     """A scene of one cable; SceneError if it is of several lines, which is not what is asked for."""
     if "" not in scene.asked_lines:
         fix = "hybrid.run, static, plan and Simulation take several lines"
-        raise SceneError(
-            [Complaint("lines", f"{len(scene.lines)} lines", "one cable, with `cable` and `ends`", fix)], file
-        )
+        raise SceneError([Complaint("lines", f"{len(scene.lines)} lines", "one cable, with `cable` and `ends`", fix)])
     return scene.asked_scene("")
 
 

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from hybrid.errors import SceneError
-from hybrid.scene.accuracy import Accuracy, AskedAccuracy
 from hybrid.scene.analysis import (
     OUTPUTS,
     PER_PERIOD,
     UNASKED_BYTES,
     VALUES,
+    Accuracy,
+    AskedAccuracy,
     Equilibrium,
     Initial,
     Mesh,
@@ -260,7 +261,7 @@ def longest_stretched(scene: LineScene) -> float:
 def _covers(scene: LineScene) -> Iterator[Iterator[Ball]]:
     """Sets of balls, the coarsest first, each of which holds all of the line; none: no bound is known."""
     ends = scene.ends.both
-    if scene.contact.ends_are_set or any(getattr(end, "payout", None) is not None for end in ends):
+    if scene.contact.around.ends_are_set or any(getattr(end, "payout", None) is not None for end in ends):
         return
     first, last = (_anchor(end) for end in ends)
     far = longest_stretched(scene)

@@ -30,6 +30,7 @@ from hybrid.scene.base import (
     PlainNumber,
     Table,
     Words,
+    by_kinds,
     decimal_comma,
     dotted,
     nearest,
@@ -61,6 +62,11 @@ def arms(annotation: Any, metadata: tuple[Any, ...] = ()) -> Iterator[tuple[Any,
         inner, *extra = get_args(annotation)
         flat = [m for e in extra for m in (e.metadata if isinstance(e, FieldInfo) else [e])]
         yield from arms(inner, (*flat, *metadata))
+    elif (origin is Union or origin is types.UnionType) and any(isinstance(m, Kinds) for m in metadata):
+        kinds = by_kinds(annotation)
+        words = Words(f"a table with kind: {' | '.join(kinds)}")
+        for kind, arm in kinds.items():
+            yield from arms(arm, (Tag(f"<{kind}>"), words, *metadata))
     elif origin is Union or origin is types.UnionType:
         for arm in get_args(annotation):
             yield from arms(arm, metadata)
@@ -200,8 +206,6 @@ def _type_in_words(annotation: Any, metadata: tuple[Any, ...]) -> str:
     for mark in metadata:
         if isinstance(mark, Words):
             return mark.text
-        if isinstance(mark, Kinds):
-            return f"a table with kind: {' | '.join(mark.names)}"
     if annotation is float or annotation is int:
         return ("a number" if annotation is float else "a whole number") + _bounds(metadata)
     if annotation is bool:

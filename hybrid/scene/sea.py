@@ -14,14 +14,9 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import (
-    AliasChoices,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AliasChoices, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
     After,
@@ -37,15 +32,11 @@ from hybrid.scene.base import (
     Text,
     Vector,
     Words,
-    by_kind,
     numbers,
     refuse,
     unwrap,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from hybrid.scene.motion_file import RecordRefused, columns_of, read_once, read_table, readable
 
 # More points than any survey of a mooring needs; they are kept in memory three times over.
 MOST_POINTS = 4_000_000
@@ -73,10 +64,7 @@ class Depths(Table):
     @property
     def surface(self) -> Surface:
         """The grid as arrays.  Only after validation: the file is readable then."""
-        if self.file is not None:
-            status = os.stat(self.file)
-            return _from_file(self.file, status.st_mtime_ns, status.st_size)
-        return _from_lists(self.x, self.y, self.depth)
+        return _from_file(self.file) if self.file is not None else _from_lists(self.x, self.y, self.depth)
 
     @model_validator(mode="after")
     def _one_grid(self) -> Depths:
@@ -84,8 +72,6 @@ class Depths(Table):
         if self.file is not None:
             fix = "leave it out, or leave file out"
             refuse(Finding((name,), "nothing, because file already gives the depths", fix) for name in given)
-            from hybrid.scene.motion_file import readable
-
             with readable(self.file):
                 assert self.surface is not None
             return self
@@ -118,8 +104,6 @@ class Surface(NamedTuple):
 
     def depth_at(self, x: float, y: float) -> tuple[float, float, float]:
         """Depth (m) and its slopes along x and y, as kernels.laws.seabed has them."""
-        import numpy as np
-
         i = int(np.clip(np.searchsorted(self.x, x, "right") - 1, 0, len(self.x) - 2))
         j = int(np.clip(np.searchsorted(self.y, y, "right") - 1, 0, len(self.y) - 2))
         h, g = self.x[i + 1] - self.x[i], self.y[j + 1] - self.y[j]
@@ -148,8 +132,6 @@ class Surface(NamedTuple):
 
 def _slopes(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Slopes along the first axis at the points `at`, limited so that the cubics between are monotone (PCHIP)."""
-    import numpy as np
-
     h = np.diff(at).reshape(-1, *[1] * (values.ndim - 1))
     chord = np.diff(values, axis=0) / h
     if len(chord) == 1:
@@ -181,8 +163,6 @@ def _surface(x: NDArray[np.float64], y: NDArray[np.float64], depth: NDArray[np.f
     corners with monotone cubics there; slopes at a point, then its mixed derivative, are reduced until the inner ones
     are, in the four cells around it.
     """
-    import numpy as np
-
     dx, dy = _slopes(depth, x), _slopes(depth.T, y).T
     both = 0.5 * (_slopes(dx.T, y).T + _slopes(dy, x))
     cells = np.stack([depth[:-1, :-1], depth[1:, :-1], depth[:-1, 1:], depth[1:, 1:]])
@@ -208,20 +188,14 @@ def _surface(x: NDArray[np.float64], y: NDArray[np.float64], depth: NDArray[np.f
 
 @lru_cache(maxsize=4)
 def _from_lists(x: tuple[float, ...], y: tuple[float, ...], depth: tuple[tuple[float, ...], ...]) -> Surface:
-    import numpy as np
-
     return _surface(np.array(x), np.array(y), np.array(depth))
 
 
-@lru_cache(maxsize=4)
-def _from_file(path: str, _changed: int, _size: int) -> Surface:
-    """The grid of a file, read once for as long as that does not change; RecordRefused."""
-    import numpy as np
-
-    from hybrid.scene.motion_file import RecordRefused, read_table
-
+@read_once(4)
+def _from_file(path: str) -> Surface:
+    """The grid of a file; RecordRefused."""
     name = os.path.basename(path)
-    header, table, lines = read_table(path, _header)
+    header, table, lines = read_table(path, columns_of(["x", "y", "depth"], ", in any order"))
     columns = [table[:, header.index(c)] for c in ("x", "y", "depth")]
     x, of_x = np.unique(columns[0], return_inverse=True)
     y, of_y = np.unique(columns[1], return_inverse=True)
@@ -240,15 +214,6 @@ def _from_file(path: str, _changed: int, _size: int) -> Surface:
         expected = f"a depth for every pair of its {len(x)} x and {len(y)} y"
         raise RecordRefused(expected, "put scattered soundings on a grid first", given)
     return _surface(x, y, columns[2][found])
-
-
-def _header(name: str, header: list[str]) -> list[str]:
-    from hybrid.scene.motion_file import RecordRefused
-
-    if sorted(header) == ["depth", "x", "y"]:
-        return header
-    given = f"{name} with columns {', '.join(header)[:60]}"
-    raise RecordRefused("columns x,y,depth, in any order", "name the columns in the first line of the file", given)
 
 
 # Soil of a seabed that remembers: nonlinear penetration with suction, lateral resistance.
@@ -435,12 +400,8 @@ Current = Annotated[
     Annotated[tuple[Number, Number, Number], Before(numbers(3)), Words(_FORMS), Tag("<vector>")]
     | Annotated[CurrentPoints, Tag("<list>")]
     | Annotated[
-        Annotated[UniformCurrent, Tag("<uniform>")]
-        | Annotated[CurrentProfile, Tag("<profile>")]
-        | Annotated[PowerLawCurrent, Tag("<power_law>")],
-        Discriminator(by_kind),
+        UniformCurrent | CurrentProfile | PowerLawCurrent,
         Kinds(
-            _KINDS,
             usual=("uniform",),
             implied=(("table", "profile"), ("bottom", "power_law"), ("speed", "uniform"), ("velocity", "uniform")),
         ),

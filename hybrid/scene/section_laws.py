@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from bisect import bisect_right
 from collections.abc import Iterator
-from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -17,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
-from hybrid.scene.base import Finding, Kinds, NonNegative, Pair, Positive, Table, Text, by_kind, refuse, value_or_table
+from hybrid.scene.base import Finding, Kinds, NonNegative, Pair, Positive, Table, Text, refuse, value_or_table
+from hybrid.scene.motion_file import RecordRefused, columns_of, read_once, read_table, readable
 
 # Factors of safety classes of DNV-OS-F201.
 SAFETY_CLASSES = {"low": 1.04, "normal": 1.14, "high": 1.26}
@@ -85,11 +85,7 @@ def _factors(first: str, factor: float, environment: float) -> Iterator[Finding]
         yield Finding(("environment_factor",), expected, "are the two exchanged?", f"{environment:g}")
 
 
-Code = Annotated[
-    Annotated[MooringCode, Tag("<E301>")] | Annotated[RiserCode, Tag("<F201>")],
-    Discriminator(by_kind),
-    Kinds(("E301", "F201"), usual=("E301",)),
-]
+Code = Annotated[MooringCode | RiserCode, Kinds(usual=("E301",))]
 
 
 # What a section bears of tension and bending together: the corners of its capacity polygon.
@@ -162,25 +158,20 @@ class CurveFile(Table):
     @property
     def rows(self) -> Curve:
         """Strain and tension (N).  Only after validation: the file is readable then."""
-        status = os.stat(self.file)
-        return _from_file(self.file, status.st_mtime_ns, status.st_size)
+        return _from_file(self.file)
 
     @model_validator(mode="after")
     def _readable(self) -> CurveFile:
-        from hybrid.scene.motion_file import readable
-
         with readable(self.file):
             assert self.rows
         return self
 
 
-@lru_cache(maxsize=16)
-def _from_file(path: str, _changed: int, _size: int) -> Curve:
-    """Rows of a file, read once for as long as that does not change; RecordRefused."""
-    from hybrid.scene.motion_file import RecordRefused, read_table
-
+@read_once(16)
+def _from_file(path: str) -> Curve:
+    """Rows of a file; RecordRefused."""
     name = os.path.basename(path)
-    header, table, lines = read_table(path, _header)
+    header, table, lines = read_table(path, columns_of(COLUMNS))
     at = [header.index(x) for x in COLUMNS]
     rows = tuple((float(x), float(y)) for x, y in table[:, at])
     for found in _findings(rows):
@@ -188,15 +179,6 @@ def _from_file(path: str, _changed: int, _size: int) -> Curve:
         given = found.given or ", ".join(f"{x:g}" for x in rows[int(found.at[0])])
         raise RecordRefused(found.expected, found.fix, f"{where}: {given}")
     return rows
-
-
-def _header(name: str, header: list[str]) -> list[str]:
-    from hybrid.scene.motion_file import RecordRefused
-
-    if sorted(header) == COLUMNS:
-        return header
-    given = f"{name} with columns {', '.join(header)[:60]}"
-    raise RecordRefused("columns strain,tension", "name the columns in the first line of the file", given)
 
 
 TensionStrain = Annotated[

@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
-from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Table, Whole, by_kind, refuse
+from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Table, Whole, refuse
 
 RAMP = "time over which the sea grows from nothing, smoothly; absent: there from the beginning [s]"
 DIRECTION = "direction (heading) in which the waves travel, from x counter-clockwise seen from above [deg]"
@@ -54,19 +54,48 @@ class Spreading(Table):
     )
 
 
-class Spectrum(Table):
-    """What irregular seas have in common: a direction, spreading, a seed and a number of waves."""
+class OnWater(Table):
+    """What all waves have, behind keys of their own."""
 
-    if TYPE_CHECKING:
-        direction: float
-        spreading: Spreading | None
-        seed: int
-        components: int
+    bases_last = True
+
+    depth: Positive | None = Field(default=None, description=DEPTH)
+    ramp: Positive | None = Field(default=None, description=RAMP)
+
+
+class Summed(OnWater):
+    """A sum of waves with random phases."""
+
+    seed: Whole = Field(default=1, ge=0, description=SEED)
+    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
 
     @property
     def waves_in_sum(self) -> int:
         """Number of linear waves."""
         return self.components
+
+
+class Spectrum(Summed):
+    """What irregular seas have in common: a direction and spreading, in most a height and one period."""
+
+    direction: Number = Field(default=0.0, description=DIRECTION)
+    spreading: Spreading | None = Field(default=None, description=SPREADING)
+
+    if TYPE_CHECKING:
+
+        @property
+        def significant_height(self) -> float: ...
+        @property
+        def peak_period(self) -> Any: ...
+
+    @property
+    def main_period(self) -> float:
+        """The period that carries most energy [s]."""
+        return float(self.peak_period)
+
+    def sizes(self) -> Iterator[Size]:
+        """Heights and periods."""
+        yield self.significant_height, ("significant_height",), self.main_period, ("peak_period",)
 
     def headings(self) -> Iterator[tuple[Place, float]]:
         """Directions [deg] that tell in which planes the water moves, with their keys."""
@@ -84,21 +113,6 @@ class JonswapWaves(Spectrum):
     )
     peak_period: Positive = Field(validation_alias=AliasChoices("peak_period", "period"), description=PEAK)
     gamma: Number = Field(default=3.3, ge=1, description="peak enhancement; 1 is a Pierson-Moskowitz sea [-]")
-    direction: Number = Field(default=0.0, description=DIRECTION)
-    spreading: Spreading | None = Field(default=None, description=SPREADING)
-    seed: Whole = Field(default=1, ge=0, description=SEED)
-    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
-
-    @property
-    def main_period(self) -> float:
-        """The period that carries most energy [s]."""
-        return self.peak_period
-
-    def sizes(self) -> Iterator[Size]:
-        """Heights and periods."""
-        yield self.significant_height, ("significant_height",), self.peak_period, ("peak_period",)
 
 
 class PiersonMoskowitzWaves(Spectrum):
@@ -115,12 +129,6 @@ class PiersonMoskowitzWaves(Spectrum):
     zero_crossing_period: Positive | None = Field(
         default=None, description="period Tz between zero crossings, 0.7104 of that at the peak [s]"
     )
-    direction: Number = Field(default=0.0, description=DIRECTION)
-    spreading: Spreading | None = Field(default=None, description=SPREADING)
-    seed: Whole = Field(default=1, ge=0, description=SEED)
-    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     usual = ("peak_period",)
 
@@ -159,12 +167,6 @@ class OchiHubbleWaves(Spectrum):
     parts: tuple[SeaPart, ...] = Field(
         min_length=2, max_length=2, description="swell and wind sea, each with its height, period and shape"
     )
-    direction: Number = Field(default=0.0, description=DIRECTION)
-    spreading: Spreading | None = Field(default=None, description=SPREADING)
-    seed: Whole = Field(default=1, ge=0, description=SEED)
-    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     @property
     def significant_height(self) -> float:
@@ -194,42 +196,20 @@ class TorsethaugenWaves(Spectrum):
         le=25,
         description="period Tp at the higher peak: below 6.6 Hs^(1/3) that of the wind sea, else of the swell [s]",
     )
-    direction: Number = Field(default=0.0, description=DIRECTION)
-    spreading: Spreading | None = Field(default=None, description=SPREADING)
-    seed: Whole = Field(default=1, ge=0, description=SEED)
-    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
-
-    @property
-    def main_period(self) -> float:
-        """The period that carries most energy [s]."""
-        return self.peak_period
-
-    def sizes(self) -> Iterator[Size]:
-        """Heights and periods."""
-        yield self.significant_height, ("significant_height",), self.peak_period, ("peak_period",)
 
 
 OneSpectrum = Annotated[
-    Annotated[JonswapWaves, Tag("<jonswap>")]
-    | Annotated[PiersonMoskowitzWaves, Tag("<pierson_moskowitz>")]
-    | Annotated[OchiHubbleWaves, Tag("<ochi_hubble>")]
-    | Annotated[TorsethaugenWaves, Tag("<torsethaugen>")],
-    Discriminator(by_kind),
-    Kinds(("jonswap", "pierson_moskowitz", "ochi_hubble", "torsethaugen"), usual=("jonswap",)),
+    JonswapWaves | PiersonMoskowitzWaves | OchiHubbleWaves | TorsethaugenWaves, Kinds(usual=("jonswap",))
 ]
 
 
-class SumOfWaves(Table):
+class SumOfWaves(OnWater):
     """Swell and wind sea: irregular seas, each with its spectrum and direction, on the same water."""
 
     kind: Literal["sum"] = Field(default="sum", description="swell and wind sea: several spectra together")
     spectra: tuple[OneSpectrum, ...] = Field(
         min_length=2, max_length=8, description="the seas; phases of all are independent, whatever their seeds"
     )
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     @property
     def significant_height(self) -> float:

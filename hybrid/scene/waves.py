@@ -16,28 +16,25 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Table, Text, Whole, by_kind, refuse
-from hybrid.scene.motion_file import RecordRefused, netcdf_reader, read_table, readable
+from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Text, Whole, refuse
+from hybrid.scene.motion_file import RecordRefused, columns_of, netcdf_reader, read_once, read_table, readable
 from hybrid.scene.wave_theory import (
-    COUNT,
-    DEPTH,
     DIRECTION,
-    RAMP,
-    SEED,
     JonswapWaves,
     OchiHubbleWaves,
+    OnWater,
     PiersonMoskowitzWaves,
     Size,
     SteadyWave,
+    Summed,
     SumOfWaves,
     TorsethaugenWaves,
     steady_wave,
@@ -95,9 +92,9 @@ class Recorded:
         return float(2.0 * np.pi * np.sum(energy / self.waves[:, 1]) / np.sum(energy))
 
 
-@lru_cache(maxsize=4)
-def given_waves(path: str, _changed: int, _size: int) -> Recorded:
-    """Waves given one by one, read once for as long as the file does not change.  RecordRefused."""
+@read_once(4)
+def given_waves(path: str) -> Recorded:
+    """Waves given one by one.  RecordRefused."""
     name = os.path.basename(path)
     header, table, lines = read_table(path, columns_of(GIVEN))
     if not 1 <= len(lines) <= MOST_WAVES:
@@ -112,12 +109,9 @@ def given_waves(path: str, _changed: int, _size: int) -> Recorded:
     return Recorded(np.column_stack([amplitude, frequency, np.radians(phase), direction]))
 
 
-@lru_cache(maxsize=4)
-def recorded_waves(path: str, band: tuple[float, float], direction: float, _changed: int, _size: int) -> Recorded:
-    """Harmonics of a measured elevation with periods (s) in a band, read once for as long as the file does not change.
-
-    RecordRefused.
-    """
+@read_once(4)
+def recorded_waves(path: str, band: tuple[float, float], direction: float) -> Recorded:
+    """Harmonics of a measured elevation with periods (s) in a band.  RecordRefused."""
     name = os.path.basename(path)
     header, table, lines = read_table(path, columns_of(RECORD))
     if len(lines) < FEWEST:
@@ -146,18 +140,6 @@ def recorded_waves(path: str, band: tuple[float, float], direction: float, _chan
     lost = max(0.0, 1.0 - 0.5 * float(np.sum(amplitude**2)) / variance)
     waves = np.column_stack([amplitude, w, w * t[0] - np.angle(X[j]), np.full(j.size, direction)])
     return Recorded(waves, float(t[0]), float(t[0] + n * step), lost, mean)
-
-
-def columns_of(wanted: list[str]) -> Callable[[str, list[str]], list[str]]:
-    """Checks a header for these columns, in any order."""
-
-    def checked(name: str, header: list[str]) -> list[str]:
-        if sorted(header) == sorted(wanted):
-            return header
-        given = f"{name} with columns {', '.join(header)[:60]}"
-        raise RecordRefused(f"columns {','.join(wanted)}", "name the columns in the first line of the file", given)
-
-    return checked
 
 
 # Waves of a measured spectrum over frequency and direction, in a file: a sum of linear waves that has it.
@@ -196,14 +178,11 @@ def shares(omega: Array, S: Array, n: int, shift: float = 0.0) -> tuple[Array, A
     ), share
 
 
-@lru_cache(maxsize=4)
-def spectrum_waves(
-    path: str, record: int | None, north: float, n: int, seed: int, _changed: int, _size: int
-) -> Recorded:
+@read_once(4)
+def spectrum_waves(path: str, record: int | None, north: float, n: int, seed: int) -> Recorded:
     """n waves of equal energy, each with a direction drawn from those at its frequency; RecordRefused.
 
-    record: which of several spectra of a netCDF file; north: deg, heading of north from x.  Read once for as long as
-    the file does not change.
+    record: which of several spectra of a netCDF file; north: deg, heading of north from x.
     """
     name = os.path.basename(path)
     if path.lower().endswith((".nc", ".h5")):
@@ -284,7 +263,7 @@ def _of_wavespectra(path: str, name: str, record: int | None) -> tuple[Array, Ar
     return f, came, E
 
 
-class RegularWaves(Table):
+class RegularWaves(OnWater):
     """Linear (Airy) waves of one period: elevation height / 2 x cos(k x - w t + phase) along their direction."""
 
     kind: Literal["regular"] = Field(default="regular", description="one period, linear (Airy)")
@@ -292,8 +271,6 @@ class RegularWaves(Table):
     period: Positive = Field(description="period T [s]")
     direction: Number = Field(default=0.0, description=DIRECTION)
     phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     @property
     def main_period(self) -> float:
@@ -314,7 +291,7 @@ class RegularWaves(Table):
         yield ("direction",), self.direction
 
 
-class StreamFunctionWaves(Table):
+class StreamFunctionWaves(OnWater):
     """Waves of one period and finite height, steady: crests are sharper than troughs, and nothing is stretched."""
 
     kind: Literal["stream_function"] = Field(
@@ -325,8 +302,6 @@ class StreamFunctionWaves(Table):
     direction: Number = Field(default=0.0, description=DIRECTION)
     phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
     order: Whole = Field(default=20, ge=5, le=40, description="number of harmonics of its Fourier series [-]")
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     def steady(self, depth: float, gravity: float) -> SteadyWave:
         """The wave in water of a depth (m; infinity: deep).  Only after validation: there is one then."""
@@ -359,7 +334,7 @@ class StreamFunctionWaves(Table):
 PeriodicWaves = RegularWaves | StreamFunctionWaves
 
 
-class _OfFile(Table):
+class _OfFile(OnWater):
     """Waves that a file gives."""
 
     if TYPE_CHECKING:
@@ -389,9 +364,15 @@ class _OfFile(Table):
         """Heights and periods."""
         yield self.significant_height, ("file",), self.main_period, ("file",)
 
-    def _refuse_unreadable(self) -> None:
+    def headings(self) -> Iterator[tuple[Place, float]]:
+        """Directions [deg] that tell in which planes the water moves, with their keys."""
+        yield from ((("file",), heading) for heading in sorted({float(x) for x in self.recorded.waves[:, 3]}))
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
         with readable(self.file):
             assert self.recorded
+        return self
 
 
 class GivenWaves(_OfFile):
@@ -403,24 +384,10 @@ class GivenWaves(_OfFile):
         description="CSV file with columns amplitude,frequency,direction,phase (m, rad/s, deg, deg), a row for every "
         "wave; relative to the scene file",
     )
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     @property
     def recorded(self) -> Recorded:
-        """The waves of the file.  Only after validation: it is readable then."""
-
-        status = os.stat(self.file)
-        return given_waves(self.file, status.st_mtime_ns, status.st_size)
-
-    def headings(self) -> Iterator[tuple[Place, float]]:
-        """Directions [deg] that tell in which planes the water moves, with their keys."""
-        yield from ((("file",), heading) for heading in sorted({float(x) for x in self.recorded.waves[:, 3]}))
-
-    @model_validator(mode="after")
-    def _readable(self) -> GivenWaves:
-        self._refuse_unreadable()
-        return self
+        return given_waves(self.file)
 
 
 class RecordedWaves(_OfFile):
@@ -440,30 +407,30 @@ class RecordedWaves(_OfFile):
     longest_period: Positive | None = Field(
         default=None, description="waves of longer periods are left out, and noted; absent: none are [s]"
     )
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     @property
     def recorded(self) -> Recorded:
-        """The waves of the file.  Only after validation: it is readable then."""
+        return recorded_waves(self.file, self._band, self.direction)
 
-        status, band = os.stat(self.file), (self.shortest_period or 0.0, self.longest_period or math.inf)
-        return recorded_waves(self.file, band, self.direction, status.st_mtime_ns, status.st_size)
+    @property
+    def _band(self) -> tuple[float, float]:
+        return self.shortest_period or 0.0, self.longest_period or math.inf
 
     def headings(self) -> Iterator[tuple[Place, float]]:
         """Directions [deg] that tell in which planes the water moves, with their keys."""
         yield ("direction",), self.direction
 
     @model_validator(mode="after")
-    def _readable(self) -> RecordedWaves:
-        short, long = self.shortest_period or 0.0, self.longest_period or math.inf
+    def _readable(self) -> Self:
+        short, long = self._band
         if long <= short:
             refuse([Finding(("longest_period",), f"more than shortest_period, {short:g} s", "swap them")])
-        self._refuse_unreadable()
+        with readable(self.file):
+            assert self.recorded
         return self
 
 
-class MeasuredWaves(_OfFile):
+class MeasuredWaves(_OfFile, Summed):
     """Irregular waves of a measured spectrum over frequency and direction: a sum of linear waves with random phases."""
 
     kind: Literal["spectrum"] = Field(default="spectrum", description="a measured spectrum, in a file")
@@ -475,53 +442,22 @@ class MeasuredWaves(_OfFile):
     )
     record: Whole | None = Field(default=None, ge=0, description="of netCDF: which of several spectra, from 0 [-]")
     north: Number = Field(default=90.0, description="of netCDF: heading of north from x, counter-clockwise [deg]")
-    seed: Whole = Field(default=1, ge=0, description=SEED)
-    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
-    depth: Positive | None = Field(default=None, description=DEPTH)
-    ramp: Positive | None = Field(default=None, description=RAMP)
 
     @property
     def recorded(self) -> Recorded:
-        """The waves of the file.  Only after validation: it is readable then."""
-
-        status, of = os.stat(self.file), (self.record, self.north, self.components, self.seed)
-        return spectrum_waves(self.file, *of, status.st_mtime_ns, status.st_size)
-
-    def headings(self) -> Iterator[tuple[Place, float]]:
-        """Directions [deg] that tell in which planes the water moves, with their keys."""
-        yield from ((("file",), heading) for heading in sorted({float(x) for x in self.recorded.waves[:, 3]}))
-
-    @model_validator(mode="after")
-    def _readable(self) -> MeasuredWaves:
-        self._refuse_unreadable()
-        return self
+        return spectrum_waves(self.file, self.record, self.north, self.components, self.seed)
 
 
 Waves = Annotated[
-    Annotated[RegularWaves, Tag("<regular>")]
-    | Annotated[StreamFunctionWaves, Tag("<stream_function>")]
-    | Annotated[JonswapWaves, Tag("<jonswap>")]
-    | Annotated[PiersonMoskowitzWaves, Tag("<pierson_moskowitz>")]
-    | Annotated[OchiHubbleWaves, Tag("<ochi_hubble>")]
-    | Annotated[TorsethaugenWaves, Tag("<torsethaugen>")]
-    | Annotated[SumOfWaves, Tag("<sum>")]
-    | Annotated[GivenWaves, Tag("<components>")]
-    | Annotated[RecordedWaves, Tag("<record>")]
-    | Annotated[MeasuredWaves, Tag("<spectrum>")],
-    Discriminator(by_kind),
-    Kinds(
-        (
-            "regular",
-            "stream_function",
-            "jonswap",
-            "pierson_moskowitz",
-            "ochi_hubble",
-            "torsethaugen",
-            "sum",
-            "components",
-            "record",
-            "spectrum",
-        ),
-        usual=("regular",),
-    ),
+    RegularWaves
+    | StreamFunctionWaves
+    | JonswapWaves
+    | PiersonMoskowitzWaves
+    | OchiHubbleWaves
+    | TorsethaugenWaves
+    | SumOfWaves
+    | GivenWaves
+    | RecordedWaves
+    | MeasuredWaves,
+    Kinds(usual=("regular",)),
 ]

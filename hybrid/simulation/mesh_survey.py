@@ -43,7 +43,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import limits_along
 from hybrid.outputs.observation import Observation
-from hybrid.scene.accuracy import ROUGHEST
+from hybrid.scene.analysis import ROUGHEST
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene

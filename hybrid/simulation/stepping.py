@@ -125,7 +125,7 @@ class Simulation(SteppedPoints):
         """The network to compute, whose ends are set, of a scene in either form."""
         if scene.time is None:
             raise SceneError([missing_time()])
-        contact = {name: {"contact": x.contact.of_ends_that_are_set()} for name, x in scene.lines.items()}
+        contact = {name: {"contact": x.contact.within(ends_are_set=True)} for name, x in scene.lines.items()}
         self.scene = in_space(scene.with_lines(contact))
         self._system, self._form = self.scene, self.scene.form
 

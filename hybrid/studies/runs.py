@@ -16,15 +16,14 @@ from importlib.metadata import version
 from pathlib import Path
 from posixpath import join, split
 from statistics import median
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
-from hybrid.scene.accuracy import of_length
-from hybrid.scene.analysis import LEAST_DAMPED, Model
-from hybrid.scene.base import Kinds, dotted
+from hybrid.scene.analysis import LEAST_DAMPED, Model, of_length
+from hybrid.scene.base import by_kinds, dotted
 from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.root import Scene
 from hybrid.simulation.progress import Progress
@@ -70,7 +69,7 @@ class RunSpec:
 
 def model_kinds() -> tuple[str, ...]:
     """The kinds of `model` that scenes know."""
-    return next(part.names for part in get_args(Model) if isinstance(part, Kinds))
+    return tuple(by_kinds(Model))
 
 
 def scene_data(

@@ -22,8 +22,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.resolution import RequestedAccuracy, requested_accuracy
-from hybrid.scene.accuracy import amount
-from hybrid.scene.analysis import LEAST_DAMPED
+from hybrid.scene.analysis import LEAST_DAMPED, amount
 from hybrid.scene.base import dotted
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene

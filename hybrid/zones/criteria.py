@@ -13,7 +13,7 @@ import numpy as np
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import requested_accuracy
-from hybrid.scene.accuracy import ROUGHEST
+from hybrid.scene.analysis import ROUGHEST
 from hybrid.scene.schema import LineScene
 
 # Share of what is asked of tension, curvature or moment along the line that leaving bending out may make: as much as

@@ -11,7 +11,7 @@ import pytest
 
 from hybrid.errors import SceneError
 from hybrid.model.obstacles import surface_of
-from hybrid.scene.mesh_file import distance_to, read_mesh
+from hybrid.scene.obstacles import distance_to, read_mesh
 from tests.kernels.test_surfaces import OBSTACLES, STRAND, Around, around, at, places, scene
 from tests.meshes import binary_stl, box, prism, sphere, text_stl
 

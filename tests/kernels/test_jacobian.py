@@ -42,7 +42,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, NO_ROOM, Ends, Line, Sea, blank_state
 from hybrid.model.obstacles import surface_of
-from hybrid.scene.mesh_file import Mesh
+from hybrid.scene.obstacles import Mesh
 
 N = 7
 CV, CA = 3.0, 7.0

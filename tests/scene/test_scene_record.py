@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hybrid.scene.motion_file import Precision
-from hybrid.scene.motion_jumps import first_jump
+from hybrid.scene.motion_file import Precision, first_jump
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from hybrid.errors import SceneError
 from hybrid.model.build import build
 from hybrid.model.mesh import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
-from hybrid.scene.accuracy import amount
+from hybrid.scene.analysis import amount
 from hybrid.scene.read import one_line
 from hybrid.scene.root import LINE
 from hybrid.simulation.run_sample import RunSample, cubic_spline
