@@ -31,8 +31,8 @@ from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import kernels_of
-from hybrid.simulation.new_run import Recording
 from hybrid.simulation.run import Run
+from hybrid.simulation.run_record import Recording
 from hybrid.simulation.run_sample import RunSample
 from hybrid.solve.stepper import LineFailed
 from hybrid.store.stored_rows import ComparisonRecorder

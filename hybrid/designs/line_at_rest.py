@@ -30,7 +30,7 @@ from hybrid.model.build import Model
 from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.line_result import WANTED, observer_of
+from hybrid.simulation.line_result import observer_of
 from hybrid.solve.stepper import POWERS, JoinedLine
 
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
@@ -320,7 +320,7 @@ class LineAtRest:
     def _observed(self, x: Beside) -> Observer:
         """What looks at a line, at its nodes where extremes are wanted, and at places."""
         points = output_points(x.scene)._replace(s=self._points(x.model))
-        observer = observer_of(x.scene, x.model, False, wanted=WANTED._replace(points=points))
+        observer = observer_of(x.scene, x.model, False, points=points)
         for wanted in self.wanted:
             if wanted.name not in observer.names:
                 names = ", ".join(sorted(name for name in observer.names if "/" not in name))

@@ -66,8 +66,7 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.lines_contact import strand_in
-from hybrid.simulation.new_run import static_system
-from hybrid.simulation.run import Run
+from hybrid.simulation.run import Run, static_system
 from hybrid.solve.contact import TouchingLine
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver

@@ -21,9 +21,9 @@ from hybrid.model.sections import NEAR
 from hybrid.scene.network import Network
 from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene
-from hybrid.simulation.new_run import Recording, run_system
-from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import kept_resolution
+from hybrid.simulation.run import new_run
+from hybrid.simulation.run_record import Recording
 from hybrid.store.format import MemoryTarget
 from hybrid.store.reader import Result, open_result, written_result
 
@@ -113,10 +113,9 @@ def replay(
     """
     network, target = with_outputs(scene, course, more, each_step, finer), MemoryTarget()
     with course.scene.form.in_words():
-        run_system(
-            network, target, scene_text(network), ProgressReporter(None, scene.require_time().duration), lambda: False,
-            resolution=NetworkResolution(course.resolutions(finer), course.tolerance), recording=Recording(begun=begun),
-        )  # fmt: skip
+        cells = NetworkResolution(course.resolutions(finer), course.tolerance)
+        recording = Recording(planes=True, begun=begun)
+        new_run(network, target, scene_text(network), True, cells, recording).record_motion()
     return written_result(target)
 
 

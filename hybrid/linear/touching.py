@@ -58,7 +58,7 @@ from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.scene.network import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
-from hybrid.simulation.new_run import static_system
+from hybrid.simulation.run import static_system
 from hybrid.solve.contact_statics import contact_stiffness
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState

@@ -40,13 +40,12 @@ from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, rods_at_rest, survey_duration, survey_points
-from hybrid.simulation.new_run import Recording, new_run, start_of
 from hybrid.simulation.own_parts import RunPart
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange, changes_text, is_cut_off, kept_resolution, with_own_contact
-from hybrid.simulation.run import Run
-from hybrid.simulation.run_of_lines import Heard
-from hybrid.simulation.run_record import AnyRecorder, Asked
+from hybrid.simulation.run import Run, new_run, start_of
+from hybrid.simulation.run_of_lines import AnyRecorder, Heard
+from hybrid.simulation.run_record import Asked, Recording
 from hybrid.simulation.run_sample import (
     ALL,
     COMPARED,
@@ -475,8 +474,10 @@ class Case:
     def _first_state(self, resolution: NetworkResolution) -> Start:
         """The first state, which may have been kept for a run of this resolution."""
         (kept, self._start), network = (self._start, None), self.scene
-        if kept is not None and kept[0] is network and _is_same(kept[1], resolution):
-            return kept[2]
+        if kept is not None and kept[0] is network:
+            lines = kept[1].lines
+            if lines.keys() == resolution.lines.keys() and all(lines[x] is y for x, y in resolution.lines.items()):
+                return kept[2]
         with at_once(self.interrupted):
             return start_of(network, build_system(network, resolution), self.moves, self.criterion)
 
@@ -501,10 +502,6 @@ class Case:
     def _comparison_interrupted(self) -> bool:
         """The same of a run to compare with."""
         return self._unwanted.is_set() or self._result_interrupted()
-
-
-def _is_same(a: NetworkResolution, b: NetworkResolution) -> bool:
-    return a.lines.keys() == b.lines.keys() and all(a.lines[name] is x for name, x in b.lines.items())
 
 
 def _datasets(data: Mapping[str, Any], *groups: str) -> list[str]:

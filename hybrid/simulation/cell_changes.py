@@ -32,8 +32,8 @@ from hybrid.model.build import Model
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import kinds_of
 from hybrid.outputs.joined_lines import Output, outputs_in
-from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.remesh import PAIRS, OfRun, OneOfMany, Part, Remesh, Shaped, by_itself, copy_fields, shaped
+from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching
 from hybrid.zones.manager import OF_BASE, all_zones
 from hybrid.zones.plan import Change

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.obstacles import (
@@ -46,12 +47,10 @@ from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
 from hybrid.simulation import watches
-from hybrid.simulation.events import EventLog
-from hybrid.simulation.failure import (
+from hybrid.simulation.events import (
     TURNS,
-    Bounds,
+    EventLog,
     borne_strain,
-    doubtful,
     kinks_at,
     most_stretched,
     slack_text_of,
@@ -61,7 +60,6 @@ from hybrid.simulation.failure import (
 )
 from hybrid.simulation.mesh_survey import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.watches import (
-    LOOP,
     PRESSED,
     Knot,
     Loops,
@@ -107,45 +105,16 @@ REMEMBERED = (
     "_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink",
     "_weight", "_lay", "_knot", "_bent", "_negative",
 )  # fmt: skip
-# What checkpoints of 0.6 files may lack of it: what was not watched then.
-UNWATCHED: dict[str, Any] = {
-    "_loop": 1.0,
-    "_writhe": np.nan,
-    "_writhes": LOOP,
-    "_bent": 0.0,
-    "_created": [*watches.NONE_CREATED],
-    "_section": False,
-    "_kink": KINK,
-    "_negative": NEGATIVE,
-    "_within": 1.0,
-    "_round": False,
-    "_between": False,
-    "_weight": False,
-    "_lay": np.zeros((0, 2)),
-    "_knot": [*Knot()],
-}
 
 
-class Watched(Protocol):
-    """What a run shows to the diagnostics after a step: one cable, or a line of several."""
+class LineStep(NamedTuple):
+    """A line after a step."""
 
-    @property
-    def t(self) -> float:
-        """Time of the state, s."""
-
-    @property
-    def state(self) -> State: ...
-
-    @property
-    def before(self) -> State:
-        """Before the last step."""
-
-    @property
-    def report(self) -> Floats:
-        """(REPORT_SIZE,) of the state (kernels.state.report)."""
-
-    @property
-    def books(self) -> Books: ...
+    t: float  # s
+    state: State
+    before: State
+    report: Floats  # (REPORT_SIZE,) of the state (kernels.state.report)
+    books: Books
 
 
 class Diagnostics:
@@ -164,7 +133,7 @@ class Diagnostics:
         self.of_scheme = SchemeWatch(model, events)
         self._kink, self._negative = KINK, NEGATIVE
         self._knot, self._lay = [*Knot()], np.full((len(sheaves_of(model.sea.values)), 2), np.nan)
-        self._loop, (self._writhe, self._writhes, self._bent) = UNWATCHED["_loop"], Loops()
+        self._loop, (self._writhe, self._writhes, self._bent) = 1.0, Loops()
 
     def begin(self) -> None:
         """Note what the contents of the model warn of."""
@@ -365,11 +334,11 @@ class Diagnostics:
         clock.bend_limit, clock.twist_limit, clock.scaled_jump = self._bend, self._twist, self._jump
         clock.slack_limit = self._slack if warns else -np.inf
 
-    def judge(self, run: Watched, flags: int) -> Stop:
+    def judge(self, step: LineStep, flags: int) -> Stop:
         """Look at what a run has flagged in its last step (kernels.state.books)."""
-        t, state, stop = run.t, run.state, None
+        t, state, stop = step.t, step.state, None
         if flags & b.JUMPED:
-            jump = float(state.T.max() - run.before.T.max())
+            jump = float(state.T.max() - step.before.T.max())
             text = (
                 f"tension jumps by {jump:.3g} N within a step: what does not stretch stops at once, and the height of "
                 f"such a peak depends on step and cells; give axial_stiffness"
@@ -379,10 +348,10 @@ class Diagnostics:
         if flags & b.STRETCHED:
             stop = self.stretch(state)
         if stop is None and flags & b.BENT:
-            stop = self.shape(t, run.report[BEND : TWIST_NODE + 1].tolist(), state)
+            stop = self.shape(t, step.report[BEND : TWIST_NODE + 1].tolist(), state)
         if flags & b.SLACKENED:
             self.tension(t, state)
-        self.watch(run.books.clock)
+        self.watch(step.books.clock)
         return stop
 
     def finish(self, books: Books) -> None:
@@ -433,8 +402,9 @@ class Diagnostics:
         for _, output in lines if self._model.kept_in is not None else ():
             if (stop := self.left_plane(output.batch.r)) is not None:
                 return stop
-        for k in np.flatnonzero(doubtful(seen, values, self._bounds)).tolist():
-            self.use_model(_with_line(*lines[k]))
+        for k in np.flatnonzero(self._doubtful(seen, values)).tolist():
+            model, output = lines[k]
+            self.use_model(replace(model, line=output.line, zones=output.zones))
             one = seen.one(k)
             self.mesh(one)
             self.of_scheme.judge_rest(self._model, one.batch, {name: x[k : k + 1] for name, x in values.items()})
@@ -443,14 +413,43 @@ class Diagnostics:
             self.contacts(output.line.s, output.batch)
         return self.of_scheme.judge(self._model, seen.batch, values, [output for _, output in lines])
 
-    @property
-    def _bounds(self) -> Bounds:
-        model = self._model
-        return Bounds(
-            self._fold, self._off, self._kink, self._negative, self._sunk, self._bend <= UNRESOLVED,
-            np.inf if self.of_scheme.rested else PRESSED, model.length, tuple(model.attached),
-            None if self._weight else model.cable,
-        )  # fmt: skip
+    def _doubtful(self, seen: JoinedObservation, values: Mapping[str, Floats]) -> NDArray[np.bool_]:
+        """Outputs (nb,) of other cells in each with something beyond a bound by which one would be noted."""
+        line, begin, model = seen.line, seen.begin[:-1], self._model
+        found = np.zeros(begin.size, bool)
+        inside = np.zeros(line.s.size, bool)
+        inside[1:-1] = (line.spin[:-1] == 0) & (line.spin[1:] == 0)
+        inside[seen.end_nodes] = False
+        inside &= ~np.isin(line.s, model.attached)
+        if inside.any():
+            half = np.where(inside, 0.5 * seen.bends[:, 0] * line.hn, 0.0)
+            found |= np.maximum.reduceat(half, begin) > np.tan(0.5 * min(self._fold, np.pi))
+            found |= np.maximum.reduceat(half * line.hn, begin) > 4.0 * self._off
+            found |= values["tension"].min(axis=1) < -self._negative * np.abs(values["tension"]).max(axis=1)
+        joints = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
+        joints = joints[~np.isin(joints, seen.end_nodes)]
+        joints = joints[~np.isin(line.s[joints], model.attached)]
+        if joints.size:
+            kinked = kinks_at(joints, seen.bends, line.hn)[:, 0] > self._kink
+            found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
+        if self._bend <= UNRESOLVED:
+            found |= bool(model.attached) | seen.has_element(0) | seen.has_element(1)
+        if not self._weight:
+            nodes, _, limits = too_long_for_weight(model.cable, line)
+            if nodes.size:
+                bent = turns_by_weight(line, seen, nodes, limits)[:, 0] > TURNS
+                found[np.searchsorted(seen.begin, nodes[bent], side="right") - 1] = True
+        if line.bits & SEABED:
+            found |= np.maximum.reduceat(seen.depth[:, 0], begin) - 0.5 * seen.sea.onset > self._sunk
+        if not self.of_scheme.rested and line.spin.any():
+            stiff = np.where(line.element == 1, line.kb[:, :2].min(axis=1) * line.hn, np.inf)
+            least = PRESSED * np.minimum.reduceat(stiff, begin) / model.length
+            least[np.isinf(least)] = 0.0
+            tension = np.where(line.spin == 1, seen.T[:, 0], np.inf)
+            tension[seen.begin[1:-1] - 1] = np.inf  # of no line
+            found |= np.minimum.reduceat(tension, begin) * model.length < -least
+            found |= values["energy/torsion"] > least
+        return found
 
     def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
         """A torque that can throw a loop, and a loop, at outputs (nb,) s with fields (nb, ...) along s (ns,) m."""
@@ -689,8 +688,3 @@ class Diagnostics:
             text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: {follows}"
             self.note(t, cell, "slack", text)
             self._slack = min(10.0 * tension, 10.0 * self._slack)
-
-
-def _with_line(model: Model, output: Output) -> Model:
-    """A model with the line of an output."""
-    return replace(model, line=output.line, zones=output.zones)

@@ -33,7 +33,7 @@ from hybrid.scene.network import Network
 from hybrid.scene.network_checks import floating_groups
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.failure import borne_strain
+from hybrid.simulation.events import borne_strain
 from hybrid.simulation.run_start import at_rest_with_contact, letting_touch, named, with_contact
 from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest, settled_with_friction

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -29,14 +30,14 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_system
+from hybrid.outputs.probes import elevation
 from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.network import Network
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.simulation.equilibrium import equilibrium_of
-from hybrid.simulation.parts import Part
+from hybrid.simulation.parts import Part, Sampled, times
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.run_points import Sampled, times
 from hybrid.solve.stepper import LineFailed
 
 # Of the height of a point: what it must be below the surface to be under water, beyond round-off.
@@ -48,7 +49,7 @@ DEEPER = 3.0
 class FloatingWatch(Part):
     """Events where a body is out of the water, what floats is pulled under, or bodies are in each other."""
 
-    name = "floating"
+    name, older = "floating", MappingProxyType({"under": {}, "overlaps": []})
 
     def __init__(self, run: RunOfLines, moves: bool) -> None:
         """moves: whether outputs are of a motion, in waves; else of an equilibrium."""
@@ -60,10 +61,6 @@ class FloatingWatch(Part):
     def checkpoint(self) -> dict[str, Any]:
         """What has been said."""
         return {"dry": sorted(self.dry), "under": dict(self.under), "overlaps": sorted(self.overlaps)}
-
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """In files of an earlier program nothing was said of what is pulled under or overlaps."""
-        return {"dry": saved["dry"], "under": saved.get("under", {}), "overlaps": saved.get("overlaps", [])}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """That has been said.  ValueError: it has names that the run does not have."""
@@ -117,7 +114,8 @@ class FloatingWatch(Part):
             point = system.points[name]
             assert isinstance(point, FreePoint)
             r, pull = _held(system, model, seen, name)
-            waves = _elevations(model.models[0].sea.values, r, seen.lines[0].sea_now) if self._moves else 0.0
+            now, sea = seen.lines[0].sea_now, model.models[0].sea.values
+            waves = np.diagonal(elevation(sea, r[:, :2], now)) if self._moves else 0.0
             height = _height(point)
             depth = level + waves - r[:, 2] - 0.5 * height
             for k in np.flatnonzero(depth > UNDER * height):
@@ -204,13 +202,6 @@ def _held(system: Network, model: NetworkModel, seen: Sampled, name: str) -> tup
         up = batch.T[:, i] * batch.e[:, i, 2] / np.linalg.norm(batch.e[:, i], axis=1)
         pull += up if last else -up
     return place, pull
-
-
-def _elevations(sea: Sea, r: Floats, now: Floats) -> Floats:
-    """Elevation (nb,) m above still water at places (nb, 3) m; now: (nb, 4) `Sea.now`."""
-    A, w, kx, ky, phase, _ = sea.waves.T
-    angle = r[:, :1] * kx + r[:, 1:2] * ky + phase - now[:, :1] * w
-    return np.asarray(now[:, 2] * (np.cos(angle) @ A))
 
 
 def _at_surface(system: Network, point: FreePoint, name: str, place: Floats, z: float) -> str:

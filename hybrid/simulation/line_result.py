@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -32,7 +32,7 @@ from hybrid.kernels.state.books import (
     sample_size,
 )
 from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, Line, State, Work, batch_of_one, sampled_size, slip_size
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
 from hybrid.model.build import Model, as_begun, planar
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import follows_curvature, wants_errors
@@ -42,12 +42,11 @@ from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.diagnostics import Diagnostics, Stop
-from hybrid.simulation.envelope import Envelope, marked_places, marks_on
-from hybrid.simulation.events import EventLog, energy_gains_text
-from hybrid.simulation.failure import FASTEST, borne_strain, note_laid, stretch_text
+from hybrid.simulation.diagnostics import Diagnostics, LineStep, Stop
+from hybrid.simulation.events import FASTEST, EventLog, borne_strain, energy_gains_text, note_laid, stretch_text
 from hybrid.simulation.lines_contact import LinesWatch, LineWatch, diameters, least_bending
 from hybrid.simulation.remesh import Around, HasPlane
+from hybrid.simulation.result_file import Envelope, marked_places, marks_on
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.solve.contact import SelfContact
 from hybrid.solve.flaws import slack_cell
@@ -68,6 +67,9 @@ if TYPE_CHECKING:
 FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
+# Nodes of outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
+MOST_ASIDE = 20_000
+FEWEST_JOINED = 4
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
 # Flags of a step (kernels.state.books), and bits of kernels.contact.self_distance.
@@ -87,27 +89,25 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
     return float(twist) / (2.0 * np.pi)
 
 
-# What makes the recorder of a line: the equilibrium that it starts from, if it does, and outputs after the first.
-NewRecorder = Callable[["LineResult", "LinesAtRest | None", int], Rows]
-
-
 class Wanted(NamedTuple):
     """What is wanted of the outputs of a line beside what its scene says."""
 
-    record: NewRecorder | None = None  # makes what the line is recorded by; None: it is only to be compared with
-    points: OutputPoints | None = None  # None: those of the scene
-
-
-WANTED = Wanted()
+    # what makes the recorder of a line that starts from an equilibrium or not, with so many outputs after the first;
+    # None: it is only to be compared with
+    record: Callable[[LineResult, LinesAtRest | None, int], Rows] | None
+    points: OutputPoints | None  # None: those of the scene
 
 
 def observer_of(
-    scene: LineScene, model: Model, moves: bool, only: Sequence[str] | None = None, wanted: Wanted = WANTED
+    scene: LineScene, model: Model, moves: bool, only: Sequence[str] | None = None, points: OutputPoints | None = None
 ) -> Observer:
-    """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
-    points = wanted.points or output_points(scene)
-    if wanted.points is None and moves and model.payout is not None:
+    """What records the outputs of a line at points (None: those of its scene).
+
+    moves: whether it does, or is in equilibrium; only: quantities, None: all.
+    """
+    if points is None and moves and model.payout is not None:
         points = output_points(scene, model.payout.longest, not model.payout.side)
+    points = points or output_points(scene)
     zones_move = moves and model.layout is not None
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
@@ -126,16 +126,6 @@ def observer_of(
     observer = Observer(line, model.sea.values, model.zones, points, features, recorded)
     observer.line = model.line
     return observer
-
-
-class LineStep(NamedTuple):
-    """A line after a step, as its diagnostics look at it."""
-
-    t: float  # s
-    state: State
-    before: State
-    report: Floats
-    books: Books
 
 
 class Waiting(NamedTuple):
@@ -157,7 +147,7 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: LineScene, model: Model, found: LinesAtRest | None, state: State,
-        outputs: int, wanted: Wanted = WANTED, paying: PayingOut | None = None,
+        outputs: int, wanted: Wanted, paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its network; found: the equilibrium that it starts from, or None.
 
@@ -169,7 +159,8 @@ class LineResult:
         self.held = np.ones(2, np.int8)  # (2,) ends that count as held in outputs: all but free ones, by their points
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
-        self.observer = observer_of(scene, model, self._moves, COMPARED if wanted.record is None else None, wanted)
+        only = COMPARED if wanted.record is None else None
+        self.observer = observer_of(scene, model, self._moves, only, wanted.points)
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self.marked = marked_places(scene, model)
         self.envelope.itself.on &= wanted.record is not None or bool(model.line.bits & MAY_TOUCH)
@@ -191,7 +182,7 @@ class LineResult:
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
         self._ratios: list[Floats] = []  # of criteria, where they are written
-        self._aside = OutputsAside()  # of other cells
+        self._aside: list[tuple[Model, Output]] = []  # that wait, each of a line of its own
         self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._log: list[Floats] = []
 
@@ -319,7 +310,10 @@ class LineResult:
         """Whether outputs wait though the cells that they are of change, by the curvature or at a winch."""
         change = follows_curvature(self.scene) if self.paying is None else self.model.layout is None
         change = change and self._moves and not self.touches and self.shown is None
-        return change and may_be_joined(self.observer, self.model.line)
+        # all that is written has to follow from the states
+        line, of_states = self.model.line, not self.observer.writes_criteria and self.observer.quantities is None
+        laws = line.law, line.bend_law, line.slip_law, line.torsion, line.tension_twist
+        return change and of_states and line.h.size >= FEWEST_JOINED and not any(x.size for x in laws)
 
     def use_model(self, model: Model, other_cells: bool = False) -> None:
         """Go on with another model, after what waits has been recorded.
@@ -330,9 +324,8 @@ class LineResult:
             return
         if not (other_cells and self.outputs_join):
             self.write_down()
-        self.model, first = model, self.observer.first_energy
+        self.model = model
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
-        self.observer.first_energy = first
         self.books.hinges[:] = model.hinges
         self.diagnostics.use_model(model)
         self._itself = LineWatch(self.envelope.itself, model)
@@ -457,18 +450,19 @@ class LineResult:
             manager, t = self.manager, float(batch.t[-1])
             self.diagnostics.torque(t, manager.torque * manager.compliance, manager.torque)
         if self._sampled:
-            self._aside.put(self.model, self._sampled)
+            self._aside += [(self.model, x) for x in self._sampled]
             self._sampled = ()
         elif self.outputs_join:
             line, paying = self.model.line, self.paying
             own = outputs_in(batch, line, self.model.zones) if paying is None else paying.outputs_of_now(line, batch)
-            self._aside.put(self.model, own)
+            self._aside += [(self.model, x) for x in own]
         else:
             self._waiting.append(batch)
             if self.observer.writes_criteria and self.manager is not None:
                 now = self.manager.largest_ratios(self.observer.grid.s)
                 self._ratios.append(np.repeat(now[None], len(batch.t), axis=0))
-        full = sum(len(x.t) for x in self._waiting) >= WAITING or self._aside.full
+        full = sum(len(x.t) for x in self._waiting) >= WAITING
+        full |= sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE
         full |= self.cells is not None and bool(self._waiting)  # which change, and these with them
         if full or not self._moves:
             self.write_down()
@@ -479,11 +473,7 @@ class LineResult:
             self.recorder.log_rows(np.concatenate(self._log))
             self._log.clear()
         if self._aside:
-            watch = None if isinstance(self.recorder, ComparisonRecorder) else self.diagnostics
-            t = float(self._aside.waiting[-1][1].batch.t[-1])
-            stop = self._aside.record(self.observer, self.recorder, watch)
-            self.diagnostics.use_model(self.model)
-            self._stop_if(stop, t)
+            self._record_aside()
         if not self._waiting:
             return
         waiting, self._waiting = self._waiting, []
@@ -505,14 +495,27 @@ class LineResult:
             stop = self.diagnostics.outputs(seen, values)
         self._stop_if(stop, float(batch.t[-1]))
 
+    def _record_aside(self) -> None:
+        """Record together the outputs that wait of other cells in each, and look at them."""
+        aside, self._aside = self._aside, []
+        outputs, stop = [x for _, x in aside], None
+        there, seen = self.observer.joined_observation(outputs)
+        values = there.values_of(seen)
+        self.observer.first_energy = there.first_energy
+        zones = [self.observer.rows_of(x.zones) for x in outputs]
+        self.recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
+        if not isinstance(self.recorder, ComparisonRecorder):
+            stop = self.diagnostics.joined_outputs(seen, values, aside)
+        self.diagnostics.use_model(self.model)
+        self._stop_if(stop, float(outputs[-1].batch.t[-1]))
+
     def observe(self, batch: Batch) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """What makes values of outputs, these as computed, and the zones of all but the first where they differ."""
         if self.paying is not None:
             return self.paying.observe(self.observer, self.model, batch)
         if self.observer.zones is not self.model.zones:  # kinds have changed
-            model, first = self.model, self.observer.first_energy
+            model = self.model
             self.observer = self.observer.on(model.line, model.sea.values, model.zones, self.books.hinges)
-            self.observer.first_energy = first
         return self.observer, self.observer.observation(batch), []
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
@@ -539,12 +542,12 @@ class LineResult:
 
     def waiting(self) -> Waiting:
         """Outputs and steps that wait, to come back to."""
-        aside, log = [*self._aside.waiting], [*self._log]
+        aside, log = [*self._aside], [*self._log]
         return Waiting([*self._waiting], [*self._ratios], aside, log, self.observer.first_energy)
 
     def wait_again(self, kept: Waiting) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
-        self._waiting, self._aside, self._log = [*kept.outputs], OutputsAside(kept.aside), [*kept.log]
+        self._waiting, self._aside, self._log = [*kept.outputs], [*kept.aside], [*kept.log]
         self._ratios = [*kept.ratios]
         self.observer.first_energy = kept.first_energy
 
@@ -574,37 +577,32 @@ class LineResult:
 
     def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""
-        books, answers = self.books, answers_of(work.torsion)
         return {
-            "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock.stored),
-            "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes),
-            "before": {
-                "imposed": books.imposed[0].copy(), "report": books.report[1].copy(),
-                "tension": books.tension[0].copy(), "twist": books.twist[0].copy(), "touch": books.touch[:1].copy(),
-            },
-            "noted": self.diagnostics.checkpoint(books),
-            "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
-            **({"torsion": {name: x.copy() for name, x in answers.items()}} if answers else {}),
+            **self._kept(work), "stored": float(self.books.clock.stored), "ends": self.model.ends.checkpoint(),
+            "envelope": self.envelope.checkpoint(self.books.extremes),
+            "noted": self.diagnostics.checkpoint(self.books), "first_energy": self.observer.first_energy or 0.0,
             **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
-            **self.references(),
         }  # fmt: skip
 
-    def references(self) -> dict[str, Floats]:
-        """From where excursions, m, and from which azimuths, deg, count that are recorded with the line."""
-        found = self.observer.quantities
-        places = {} if found is None else {"first_places": found.first, "first_turns": found.turns}
-        return {name: x.copy() for name, x in places.items() if x.size}
+    def _kept(self, work: Work) -> dict[str, Any]:
+        """Arrays of the line that a checkpoint keeps as they are; `before`: of what outputs in a step are made, too."""
+        books, answers, asked = self.books, answers_of(work.torsion), self.observer.quantities
+        before = {
+            "imposed": books.imposed[0], "report": books.report[1], "tension": books.tension[0],
+            "twist": books.twist[0], "touch": books.touch[:1],
+        }  # fmt: skip
+        # from where excursions, m, and from which azimuths, deg, count that are recorded with the line
+        places = {} if asked is None else {"first_places": asked.first, "first_turns": asked.turns}
+        return {
+            "work": books.work[0], "power": books.power[0], "report": work.report, "before": before,
+            **({"torsion": answers} if answers else {}), **{name: x for name, x in places.items() if x.size},
+        }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
         """Go on at t (s) as `checkpoint` has written; joints: as of `JoinedLine`.  ValueError: that cannot be."""
         books, model = self.books, self.model
-        books.work[0], books.power[0], books.clock.stored = saved["work"], saved["power"], saved["stored"]
-        work.report[:] = books.report[0] = saved["report"]
-        before = saved["before"]  # what outputs within the next step are made of
-        books.imposed[0], books.report[1], books.tension[0] = (before[x] for x in ("imposed", "report", "tension"))
-        books.twist[0], books.touch[:1] = before["twist"], before["touch"]
-        for name, x in answers_of(work.torsion).items():
-            x[:] = saved["torsion"][name]
+        _put_back(self._kept(work), saved)
+        books.report[0], books.clock.stored = work.report, saved["stored"]
         if saved["envelope"] is not None:
             self.envelope.restore(saved["envelope"], books.extremes)
         else:
@@ -612,9 +610,6 @@ class LineResult:
         books.start[:] = self.envelope.start_of(model.nodes)
         books.placed[:] = self.diagnostics.restore(saved["noted"], books, books.start)
         self.observer.first_energy = saved["first_energy"]
-        if (quantities := self.observer.quantities) is not None and self.references():
-            quantities.first[:] = saved.get("first_places", quantities.first)
-            quantities.turns[:] = saved.get("first_turns", quantities.turns)
         if self.contact is not None:
             self.contact.restore(saved["self_contact"], t)
         ends = saved["ends"] | {"released": model.ends.released}  # as what broke says: files of 1.0 have none released
@@ -625,47 +620,10 @@ class LineResult:
                 raise ValueError(f"an end of line {self.name} is {apart[k]:.3g} m from where it was: other files?")
 
 
-# Outputs of a line whose cells are others in each: they are put aside, and looked at and recorded together.
-
-# Nodes of the outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
-MOST_ASIDE = 20_000
-FEWEST_JOINED = 4
-
-
-def may_be_joined(observer: Observer, line: Line) -> bool:
-    """Whether outputs of other cells can be looked at together: all that is written follows from their states."""
-    of_states = not observer.writes_criteria and observer.quantities is None
-    plain = not (
-        line.law.size or line.bend_law.size or line.slip_law.size or line.torsion.size or line.tension_twist.size
-    )
-    return of_states and plain and line.h.size >= FEWEST_JOINED
-
-
-class OutputsAside:
-    """Outputs that wait, each of a line of its own."""
-
-    def __init__(self, waiting: Iterable[tuple[Model, Output]] = ()) -> None:
-        self.waiting = [*waiting]
-
-    def __bool__(self) -> bool:
-        return bool(self.waiting)
-
-    @property
-    def full(self) -> bool:
-        """Whether they have so many nodes that no more should wait."""
-        return sum(x.line.s.size for _, x in self.waiting) > MOST_ASIDE
-
-    def put(self, model: Model, outputs: Iterable[Output]) -> None:
-        """Let outputs wait; model: of the cable, on whatever cells."""
-        self.waiting += [(model, x) for x in outputs]
-
-    def record(self, observer: Observer, recorder: Rows | ComparisonRecorder, diagnostics: Diagnostics | None) -> Stop:
-        """Record all, and look at them (None: nobody does): why going on would make no sense, if so."""
-        aside, self.waiting = self.waiting, []
-        outputs = [x for _, x in aside]
-        there, seen = observer.joined_observation(outputs)
-        values = there.values_of(seen)
-        observer.first_energy = there.first_energy
-        zones = [observer.rows_of(x.zones) for x in outputs]
-        recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
-        return None if diagnostics is None else diagnostics.joined_outputs(seen, values, aside)
+def _put_back(arrays: Mapping[str, Any], saved: Mapping[str, Any]) -> None:
+    """Arrays by name become those that are saved."""
+    for name, x in arrays.items():
+        if isinstance(x, Mapping):
+            _put_back(x, saved[name])
+        else:
+            x[:] = saved[name]

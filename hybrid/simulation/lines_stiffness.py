@@ -25,8 +25,8 @@ from hybrid.scene.bodies import BodyShape, FixedBody, FreeBody, HeldBody
 from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
-from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.equilibrium import equilibrium_of
+from hybrid.simulation.result_file import marks_of
 from hybrid.simulation.run_contact import refuse_within_itself
 from hybrid.simulation.run_start import contacts_of
 from hybrid.solve.contact_statics import touching_solver

@@ -17,7 +17,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,10 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed
 from hybrid.store.integrity import pack
+
+if TYPE_CHECKING:  # what a run without winches does not load
+    from hybrid.simulation.payout import PayingOut
+    from hybrid.simulation.run_payout import RunPayout
 
 NAME = re.compile(r"[A-Za-z][\w-]{0,26}")  # with "part " before it a kind of events, which has 32 bytes
 # Verbs of a part that are called for a run, and how many arguments each has.
@@ -73,15 +77,6 @@ class RunPart:
         vars(self).update(saved)
 
 
-class Winches(Protocol):
-    """Lines of a run that are paid out, by number."""
-
-    @property
-    def lines(self) -> Mapping[int, Any]: ...
-
-    def stop(self, number: int, over: float) -> None: ...
-
-
 class RunView:
     """A run as a part of the user's own sees it: what may be read, and what may be asked.
 
@@ -89,7 +84,7 @@ class RunView:
     Arrays are copies, in SI units and inertial axes.
     """
 
-    def __init__(self, run: RunOfLines, lines: Sequence[str], winches: Winches | None, part: str) -> None:
+    def __init__(self, run: RunOfLines, lines: Sequence[str], winches: RunPayout | None, part: str) -> None:
         self._run, self._winches, self._part = run, winches, part
         self._numbers = {name: k for k, name in enumerate(lines)}
         self.may_ask = False  # by a part, between two steps
@@ -195,7 +190,7 @@ class RunView:
         known = ", ".join(self._numbers) if [*self._numbers] != [""] else "none, because the only line has no name"
         raise ValueError(f"part {self._part}: line {line!r}: expected one of {known}")
 
-    def _paid(self, number: int) -> Any:
+    def _paid(self, number: int) -> PayingOut:
         reels = {} if self._winches is None else self._winches.lines
         if number not in reels:
             raise ValueError(f"part {self._part}: line {self.lines[number]!r} has no payout")
@@ -212,7 +207,7 @@ class OwnParts(Part):
     name = "own"
 
     def __init__(
-        self, run: RunOfLines, given: Sequence[RunPart], lines: Sequence[str], winches: Winches | None
+        self, run: RunOfLines, given: Sequence[RunPart], lines: Sequence[str], winches: RunPayout | None
     ) -> None:
         """given: checked (`checked_parts`); lines: their names in the scene."""
         self._run = run

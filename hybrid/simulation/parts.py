@@ -8,15 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from math import inf
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.run.network import SAMPLE_AXES, SAMPLE_LINES, SAMPLE_V, SAMPLE_W
+from hybrid.kernels.state.state import Batch, Floats, Line
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
-from hybrid.simulation.run_points import Sampled
 from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
@@ -44,11 +45,37 @@ ORDER = (
 EVERY_STEP = 1 << 40  # beside the bits of Counts.notices: of every step that Python has a part in
 
 
+class Sampled(NamedTuple):
+    """Outputs of a system: nb states of its lines and bodies."""
+
+    lines: Sequence[Batch]
+    bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.network
+
+    @property
+    def t(self) -> Floats:
+        """Times (nb,), s; an array of one's own."""
+        return self.lines[0].t.copy()
+
+    def frame(self, body: int) -> Floats:
+        """Axes (nb, 3, 3) of a body, as columns."""
+        return self.bodies[:, body, SAMPLE_AXES:SAMPLE_V].reshape(-1, 3, 3)
+
+    def spin(self, body: int) -> Floats:
+        """Its angular velocity (nb, 3) 1/s, inertial."""
+        return times(self.frame(body), self.bodies[:, body, SAMPLE_W:SAMPLE_LINES])
+
+
+def times(frames: Floats, x: Floats) -> Floats:
+    """Frames (nb, 3, 3) times vectors (nb, 3), or one (3,): the same bits for each, however many there are."""
+    return np.asarray(frames[..., 0] * x[..., :1] + frames[..., 1] * x[..., 1:2] + frames[..., 2] * x[..., 2:])
+
+
 class Part:
     """A capability of a run, by the verbs that its loop has for all of them; here none does anything."""
 
     name = ""  # its place in ORDER
     is_of_form = False  # whether what it keeps in a checkpoint has the form of what it would keep now
+    older: Mapping[str, Any] = MappingProxyType({})  # what it keeps that files of earlier programs may lack, as it was
 
     @property
     def changed(self) -> Collection[int]:
@@ -219,7 +246,7 @@ class Part:
 
     def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
         """Of a checkpoint, what it keeps, with what files of earlier programs do not have."""
-        return {}
+        return {name: saved.get(name, x) for name, x in self.older.items()}
 
     def restore_joints(self, saved: Mapping[str, Any]) -> bool:
         """Lines of the scene come loose, or touch, as in a checkpoint; whether a solver has to follow.

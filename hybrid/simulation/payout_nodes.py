@@ -34,7 +34,6 @@ from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.remesh import (
     NO_LAWS,
     PAIRS,
@@ -47,6 +46,7 @@ from hybrid.simulation.remesh import (
     copy_fields,
     shaped,
 )
+from hybrid.simulation.result_file import marks_on
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
 

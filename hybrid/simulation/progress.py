@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol, TextIO
+from typing import Any, TextIO
 
 from hybrid.errors import command_for
 from hybrid.kernels.machine.compile import is_warm
@@ -297,16 +297,6 @@ def at_once(heard: Callable[[], bool] = lambda: False) -> Iterator[None]:
 WITHOUT = f"progress as text; a bar in the notebook needs: {command_for('notebook')}"
 
 
-class Reported(Protocol):
-    """What a bar reads of a `Progress`."""
-
-    @property
-    def fraction(self) -> float: ...
-
-    @property
-    def text(self) -> str: ...
-
-
 def in_notebook() -> bool:
     """Whether the code runs in a kernel of Jupyter; IPython is not imported to find out."""
     ipython = sys.modules.get("IPython")
@@ -332,7 +322,7 @@ class NotebookBar:
         self._box = widgets.HBox([self._bar, self._text])
         self._shown = False
 
-    def __call__(self, progress: Reported) -> None:
+    def __call__(self, progress: Progress) -> None:
         self._show()
         self._bar.value, self._text.value = progress.fraction, progress.text
 

@@ -49,8 +49,8 @@ from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.model.network import NetworkModel
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.envelope import Envelope
 from hybrid.simulation.lines_contact import LinesWatch
+from hybrid.simulation.result_file import Envelope
 from hybrid.solve.contact import SelfContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps

@@ -93,8 +93,14 @@ def as_of_line(saved: Mapping[str, Any], name: str, model: Model, weaknesses: Se
     found = _of_run(saved) | {"lines": {name: line}, "quantities": {}, "dry": [], "overlaps": [], "under": {}}
     found["broken"] = _broken(line["ends"]["released"], weaknesses)
     found["vibrations"] = {name: saved["vibration"]} if "vibration" in saved else {}
-    found["zones"] = {} if saved["zoning"] is None else {name: _zones(saved)}
-    found["planes"] = {name: {"plane": saved["plane"], "home": saved.get("home"), "push": _push(saved["push"])}}
+    # zones of a line that is paid out are of the cells that its winch has made
+    cells, push = saved["mesh"] if saved.get("payout") is None else saved["payout"], saved["push"]
+    found["zones"] = {}
+    if saved["zoning"] is not None:
+        found["zones"][name] = {"rod": cells["rod"], "here": cells.get("here"), "switching": saved["zoning"]}
+    if isinstance(push, dict):  # a file of 0.6 does not say whether it was real, and none was
+        push = {"real": False} | push
+    found["planes"] = {name: {"plane": saved["plane"], "home": saved.get("home"), "push": push}}
     return found if saved.get("payout") is None else found | {"payout": {name: saved["payout"]}}
 
 
@@ -111,17 +117,6 @@ def _of_run(saved: Mapping[str, Any]) -> dict[str, Any]:
     return found | {"loaded": saved["t"], "control": steps, "cuts": cuts}
 
 
-def _zones(saved: Mapping[str, Any]) -> dict[str, Any]:
-    """Zones that move; those of a line that is paid out are of the cells that its winch has made."""
-    cells = saved["mesh"] if saved.get("payout") is None else saved["payout"]
-    return {"rod": cells["rod"], "here": cells.get("here"), "switching": saved["zoning"]}
-
-
-def _push(saved: Any) -> Any:
-    """A push out of the plane; a file of 0.6 does not say whether it was real, and none was."""
-    return {"real": False} | saved if isinstance(saved, dict) else saved
-
-
 def _broken(saved: Any, weaknesses: Sequence[Weakness]) -> list[int]:
     """Numbers of what may break, of the ends (2,) that had been let go."""
     released = matched(saved, np.zeros(2, int), "ends/released")
@@ -133,7 +128,11 @@ def _broken(saved: Any, weaknesses: Sequence[Weakness]) -> list[int]:
 
 def _check_mesh(saved: Any, model: Model) -> None:
     """ValueError: the nodes, or the zones, of a checkpoint are not those of the model."""
-    mine = mesh_tree(model)
+    if model.layout is not None:
+        mine: Tree = (model.layout if model.payout is None else model.payout.first_layout)._asdict()
+    else:
+        assert not isinstance(model.mesh, Layout)
+        mine = {"s": model.mesh[0], "zones": [[x.kind, x.s_a, x.s_b] for x in model.mesh[1]]}
     mesh = matched({"here": None} | dict(saved), dict.fromkeys({"here": None} | mine), "mesh")
 
     def same(a: Any, b: Floats) -> bool:
@@ -145,15 +144,6 @@ def _check_mesh(saved: Any, model: Model) -> None:
         fits = same(mesh["base"], mine["base"]) and np.array_equal(mesh["parts"], mine["parts"])
     if not fits:
         raise ValueError("nodes that are not those of the line")
-
-
-def mesh_tree(model: Model) -> Tree:
-    """Where the nodes of a model are, and its zones, for a checkpoint."""
-    if model.layout is not None:
-        return (model.layout if model.payout is None else model.payout.first_layout)._asdict()
-    assert not isinstance(model.mesh, Layout)
-    s, zones = model.mesh
-    return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
 
 
 def of_line(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -341,24 +331,6 @@ def is_cut_off(source: Path, texts: tuple[str, str], resolution: NetworkResoluti
     return pack(dict.fromkeys(asked, tree) if is_of_cable(tree) else tree) == pack(asked)
 
 
-def restored_points(result: Result, length: float, far: float | None = None) -> OutputPoints:
-    """The output points of a result, which whoever continues it keeps; one of 0.6 has no jumps.
-
-    far: m, arc length of the end of a line that is paid out at its start.
-    ValueError: none of a cable of that length (m).
-    """
-    s = np.asarray(result["s"], float)
-    jumps = np.asarray(result["right/s"], float) if "right/s" in result else np.zeros(0)
-    ordered = s.ndim == 1 and s.size > 0 and bool((np.diff(s) > 0.0).all())
-    begin, end = (0.0, length) if far is None else (far - length, far)
-    near = 1e-9 * length if far is not None else 0.0
-    if not (ordered and s[0] >= begin - near and s[-1] <= end + 1e-9 * length):
-        raise ValueError(f"s: output points that increase from {begin:g} to {end:g} m at most were expected")
-    if jumps.ndim != 1 or not np.isin(jumps, s).all():
-        raise ValueError("right/s: places among the output points s were expected")
-    return OutputPoints(s, jumps)
-
-
 # --- the model ----------------------------------------------------------------------------------
 
 
@@ -460,15 +432,35 @@ def _what_is_left(path: Path) -> tuple[Remaining[Any], bool]:
 
 
 def _points_of(result: Result, scene: LineScene) -> OutputPoints:
-    """Where outputs of the line of a result are; ValueError: they are not on it."""
-    return restored_points(result, longest_out(scene), None if winch_side(scene) else scene.length)
+    """Where outputs of the line of a result are, which whoever continues it keeps; one of 0.6 has no jumps.
+
+    ValueError: they are not on the line.
+    """
+    s = np.asarray(result["s"], float)
+    jumps = np.asarray(result["right/s"], float) if "right/s" in result else np.zeros(0)
+    ordered = s.ndim == 1 and s.size > 0 and bool((np.diff(s) > 0.0).all())
+    length, at_start = longest_out(scene), not winch_side(scene)  # paid out at its start, where arc lengths begin below
+    begin, end = (scene.length - length, scene.length) if at_start else (0.0, length)
+    near = 1e-9 * length
+    if not (ordered and s[0] >= begin - near * at_start and s[-1] <= end + near):
+        raise ValueError(f"s: output points that increase from {begin:g} to {end:g} m at most were expected")
+    if jumps.ndim != 1 or not np.isin(jumps, s).all():
+        raise ValueError("right/s: places among the output points s were expected")
+    return OutputPoints(s, jumps)
 
 
 def _longer(left: Remaining[Any], until: float) -> Remaining[Any]:
     """The same until another time (s), with outputs as often as before."""
-    of_line = "".join(f".lines[{name!r}]" for name in [*left.scene.asked_lines][:1] if name)
-    _refuse_what_is_no_later_time(until, left.reached, f"hybrid.open(path){of_line}.at(t=...)")
-    _refuse_before_changes(left.changes, until)
+    reached, later = left.reached, [x.t for x in left.changes if x.t >= until]
+    if not math.isfinite(until):
+        raise _refused("until", f"{until:g} s", "a time in s", f"--until {2.0 * reached or 100.0:g}")
+    if until < reached:
+        of_line = "".join(f".lines[{name!r}]" for name in [*left.scene.asked_lines][:1] if name)
+        fix = f"the file holds everything before: hybrid.open(path){of_line}.at(t=...)"
+        raise _refused("until", f"{until:g} s", f"a time after {reached:g} s, up to which it is computed", fix)
+    if later:
+        fix = "a later end; a change that was asked for cannot be taken back"
+        raise _refused("until", f"{until:g} s", f"a time after the change at {later[0]:g} s", fix)
     every = left.scene.output_interval
     scene = _scene_until(left.scene, until, every)
     _refuse_more_out(left.scene, scene, until)
@@ -555,23 +547,6 @@ def _changes_of(path: Path, result: Result) -> list[tuple[float, str]]:
     except (ValueError, TypeError, KeyError) as error:
         advice = f"    detail:   {error}\n    try:      run its scene again"
         raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
-
-
-def _refuse_what_is_no_later_time(until: float, reached: float, reading: str) -> None:
-    """SceneError if a run that has reached a time (s) cannot go on to another; reading: how what is there is read."""
-    if not math.isfinite(until):
-        raise _refused("until", f"{until:g} s", "a time in s", f"--until {2.0 * reached or 100.0:g}")
-    if until < reached:
-        expected = f"a time after {reached:g} s, up to which it is computed"
-        raise _refused("until", f"{until:g} s", expected, f"the file holds everything before: {reading}")
-
-
-def _refuse_before_changes(changes: Sequence[LoadChange[Any]], until: float) -> None:
-    """SceneError if a run is to end before a change that was asked for."""
-    later = [x.t for x in changes if x.t >= until]
-    if later:
-        fix = "a later end; a change that was asked for cannot be taken back"
-        raise _refused("until", f"{until:g} s", f"a time after the change at {later[0]:g} s", fix)
 
 
 def _check_what_changes(last: LoadChange[Any], changed: Any, begin: float, end: float) -> None:

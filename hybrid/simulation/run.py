@@ -2,51 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import process_time as clock_now
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import proxy
 
 import numpy as np
 
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import Floats, Line, Moves, Work
-from hybrid.model.build import Model
-from hybrid.model.ends import table_of_loads
+from hybrid.kernels.state.state import state_for
 from hybrid.model.failure import Weakness
-from hybrid.model.network import NetworkModel
-from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on
+from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.equilibrium import joined_lines
-from hybrid.simulation.failure import write_snapshot
-from hybrid.simulation.line_result import WAITING
-from hybrid.simulation.parts import EVERY_STEP
-from hybrid.simulation.restart import other_program, refused, require_same
-from hybrid.simulation.run_checkpoint import (
-    content,
-    restore,
-)
-from hybrid.simulation.run_contact import (
-    refuse_within_itself,
-)
-from hybrid.simulation.run_record import RecordedRun
+from hybrid.simulation.events import write_snapshot
+from hybrid.simulation.floating_watch import FloatingWatch
+from hybrid.simulation.line_result import LineResult, Wanted
+from hybrid.simulation.lone_planes import LonePlanes
+from hybrid.simulation.own_parts import OwnParts
+from hybrid.simulation.parts import EVERY_STEP, Part, Parts
+from hybrid.simulation.progress import at_once
+from hybrid.simulation.restart import LoadChange, kept_resolution, other_program, refused, require_same
+from hybrid.simulation.run_contact import RunContact, refuse_within_itself
+from hybrid.simulation.run_failures import Cuts, Failures
+from hybrid.simulation.run_of_lines import LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
+from hybrid.simulation.run_record import ALONE, RecordedRun, Recording, RunFile, RunRecorder, kept_changes, restore
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
+from hybrid.simulation.run_zones import RunZones
+from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
+from hybrid.simulation.zones_at_rest import Start, managers_for, start_at_rest, zones_as_placed
 from hybrid.solve.lines_at_rest import LinesAtRest
-from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.network_steps import MOST_SAMPLED, ROWS, NetworkSteps
-from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
+from hybrid.solve.network_steps import ROWS, NetworkSteps
+from hybrid.solve.stepper import LineFailed, NetworkState
 from hybrid.store.checkpoint import read_checkpoint
-from hybrid.store.format import Target
+from hybrid.store.format import Target, Text
 from hybrid.store.hdf5_file import opened
 from hybrid.store.writer import Recorder
 from hybrid.zones.criteria import UserCriterion
 from hybrid.zones.manager import DomainManager
+
+if TYPE_CHECKING:  # what a run without winches does not load
+    from hybrid.simulation.payout import PayingOut
+    from hybrid.simulation.run_payout import RunPayout
+
 
 # Steps that Python has a part in, between two reports of the progress.
 LOOK = 16
@@ -68,18 +73,13 @@ class First(NamedTuple):
 class Run(RecordedRun):
     """The motion, or the equilibrium, of one network: its arrays, its steps, and the parts that change them.
 
-    `new_run.new_run` makes it.
+    `new_run` makes it.
     """
 
-    solver: NetworkSolver
-    other: NetworkState  # the state after the next step
     notes: Sequence[tuple[str, str]] = ()  # events (kind, text) of the whole of the run
     begun: Callable[[Run], None] | None = None  # called behind the first output
-    loaded = 0.0  # s, loads that have stopped by then act no more
-    leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
     stepped_outside = False  # whether steps are asked for one by one (simulation.stepping)
     _fitted: tuple[object, ...] | None = None  # what steps are attached to that have come to a stop
-    _loaded = np.nan  # `loaded`, of the loads that act on bodies in compiled steps
 
     def __init__(
         self, first: First, loop: NetworkSteps, target: Target | None, criterion: UserCriterion | None, kept: bool
@@ -94,15 +94,10 @@ class Run(RecordedRun):
         self.loop, self.times, self._begins = loop, loop.outputs[1:].tolist(), not first.resumed
         self.target, self.criterion, self.kept, self.moves = target, criterion, kept, bool(self.times)
         self.end = self.times[-1] if self.times else 0.0
-        self._moved: list[Moves] = []  # by which ends move in compiled steps
         self._begin = clock_now()
         self.start_from(first.model.body_places if first.resumed else first.state.bodies)
 
     # --- checkpoints ----------------------------------------------------------------------------------
-
-    def content(self) -> Mapping[str, Any]:
-        """What a checkpoint keeps."""
-        return content(self)
 
     def continue_file(self, source: Path) -> Recorder:
         """Be where the checkpoint of a result is, and write behind its rows; ResultError: that cannot be."""
@@ -174,57 +169,6 @@ class Run(RecordedRun):
         """What is due about ten times a second; finished: at the end."""
         for at_pause in self.parts.at_pause:
             at_pause(finished)
-
-    def start_from(self, bodies: Floats) -> None:
-        """Take the added mass of members of bodies that were at rest (B, STATE) when the motion began."""
-        self.rest = bodies.copy()
-        for body, row in zip(self.model.bodies, bodies, strict=False):
-            body.set_added_mass(row)
-
-    def make_solver(self) -> None:
-        """A solver for the model as it is."""
-        for part in self.parts:
-            part.fit_lines()
-        remeshes = any(part.remeshes for part in self.parts)
-        contacts, shared = next(y for part in self.parts if (y := part.touching(remeshes)) is not None)
-        lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
-        for line, x in zip(self.lines, lines, strict=True):
-            line.held = np.minimum(x.ends.held, 1)
-        self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
-        self._make_room(self.solver)
-        self.solver.keep_books([line.books for line in self.lines])
-        for use_solver in self.parts.use_solver:
-            use_solver(self.model, self.solver)
-        if self.loop.controlled:
-            self.solver.allowed[:] = self.resolution.allowed
-        self.loop.bind_members(self.model.members_of(self.solver.bodies))
-        self._moved, self._loaded = [], np.nan
-
-    def _make_room(self, solver: NetworkSolver) -> None:
-        """Room for samples of the lines and bodies as they are."""
-        rows = max(1, min(WAITING, MOST_SAMPLED // sum(line.sample_size for line in self.lines)))
-        for line in self.lines:
-            line.make_room(rows)
-        self.loop.make_room(rows, len(solver.body_work))
-
-    @property
-    def asks_quantities(self) -> bool:
-        """Whether quantities by name are among the outputs, which are found of one mesh at a time."""
-        return bool(self.file.quantities.fields)
-
-    def adopt_cells(self, number: int, model: Model, work: Work) -> None:
-        """Go on with other cells of a line, which steps have changed to."""
-        models, line = [*self.model.models], self.lines[number]
-        models[number] = model
-        self.model = replace(self.model, models=tuple(models))
-        self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
-        line.adopt_cells(model)
-        for part in self.parts:
-            part.adopt_cells(number, model.line)
-
-    def renew_other(self) -> None:
-        """Room for the state after the next step, of lines as they are now."""
-        self.other = self.state.copy()
 
     def _note(self, kind: str, text: str) -> None:
         """An event of the whole run; of the line that its text names first, if any."""
@@ -322,11 +266,11 @@ class Run(RecordedRun):
 
         What is asked around a step takes as long as a step of a hundred cells, and nearly always finds nothing.
         """
-        loop = self.loop
-        if self._steps_differ:
-            self.go_to(stop)
+        loop, one = self.loop, self.resolution.one
+        if loop.controlled or self.parts.begins or self.network.output.exact or one.ends:
+            self.go_to(stop)  # each stop has a say in the lengths of steps
             return
-        steps = equal_steps(self.leg, self.t, stop, self.resolution.one.step, False)
+        steps = equal_steps(self.leg, self.t, stop, one.step, False)
         self.leg = steps[:2]
         loop.begin_leg(stop, *steps)
         if loop.counts.quota < LOOK:  # which a call takes from
@@ -342,25 +286,13 @@ class Run(RecordedRun):
             self._fitted = None
             self._step_on(stop, code)
 
-    @property
-    def _steps_differ(self) -> bool:
-        """Whether steps are not all the same, so that each stop has a say in their lengths."""
-        one = self.resolution.one
-        return bool(self.loop.controlled or self.parts.begins or self.network.output.exact or one.ends)
-
     def _fitting(self) -> tuple[object, ...]:
         """What compiled steps are attached to: where it is the same, and they have come to a stop, they go on."""
         own = (x for attached_to in self.parts.attached_to for x in attached_to())
         return self.solver, self.model, *(x.ends.moves() for x in self.model.models), *own
 
-    def _go(self) -> int:
-        """Compiled steps, until a code of kernels.state.books."""
-        self._fitted = None
-        self._attach()
-        return self._run_attached()
-
     def _run_attached(self) -> int:
-        """The same of steps that are attached to what there is."""
+        """Compiled steps, which are attached to what there is, until a code of kernels.state.books."""
         code = self.loop.go()
         for sync in self.parts.sync:
             sync()
@@ -372,7 +304,10 @@ class Run(RecordedRun):
         loop, step, arrived = self.loop, self.resolution.one.step, False
         while not arrived:
             self._between = False
-            code = self._go() if code is None else code
+            if code is None:
+                self._fitted = None
+                self._attach()
+                code = self._run_attached()
             if code in (b.TRYING, b.TRIED, b.STEPPED, b.FAILED) or loop.is_half_full:
                 self.record_samples()  # of lines as they were until now
             if code == b.TRYING:
@@ -400,32 +335,11 @@ class Run(RecordedRun):
                     self._pause()
             code = None
 
-    def _attach(self) -> None:
-        """Steps lead from the state of now, with ends that move as they do now."""
-        loop, solver = self.loop, self.solver
-        loop.counts.asks = 0
-        if loop.attach(solver, self.state, self.other):
-            for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
-                line.attach(solver, (old, new), loop.clock, loop.counts)
-        for attach in self.parts.attach:
-            attach(loop)
-        moves = [model.ends.moves() for model in self.model.models]
-        if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
-            self._moved = moves
-            loop.move(solver, [model.ends.moves_from_here() for model in self.model.models])
-        if self._loaded != self.loaded:
-            self._loaded = self.loaded
-            loop.load(*table_of_loads(self.model.growing_loads(self.loaded)))
-
     def _prepare(self, t: float) -> None:
         """Ends, loads and zones as they are at the end of a try, t (s)."""
         for prepare in self.parts.prepare:
             prepare(t)
-        for line, model in zip(self.lines, self.model.models, strict=True):
-            model.ends.at_time(t)
-            model.sea.at_time(t)
-            line.books.velocity[:] = model.ends.velocity
-        self.model.load_bodies(t, self.solver.bodies, self.loaded)
+        self.place_ends(t)
         self.model.update_water(t, self.state.bodies, t - self.t, self.solver.bodies)
 
     def _judge(self) -> None:
@@ -448,10 +362,6 @@ class Run(RecordedRun):
         self._go_back(False)
         self.loop.try_whole()
 
-    def _explained(self, taken: NetworkTaken, dt: float) -> LineFailed:
-        """Why no step of dt (s) leads on; 0: why there are no accelerations."""
-        return next(x for part in self.parts if (x := part.explains(taken, dt)) is not None)
-
     def _go_back(self, still: bool) -> None:
         """Whether forces are found of the state before a try, which the extremes know: it counts once."""
         for line in self.lines:
@@ -472,11 +382,6 @@ class Run(RecordedRun):
         for part in self.parts:
             part.break_now(weakness, why)
 
-    def restart_steps(self) -> None:
-        """Loads, or what holds the lines, are others now: accelerations jump."""
-        self.balance()
-        self.loop.restart()
-
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): an output, which is of the moment before, and other loads."""
         self.output_due()
@@ -488,12 +393,6 @@ class Run(RecordedRun):
             self.restart_steps()
         if self.network.output.exact or self.resolution.one.ends or falls_on(stop, self._breaks, step):
             self.leg = (stop, 0)
-
-    def output_due(self) -> None:
-        """Make the output that is due now, if one is: before loads, or what holds lines, become others."""
-        if self.loop.due:
-            self._attach()
-            self._output()
 
     def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""
@@ -537,76 +436,149 @@ class Run(RecordedRun):
         content: dict[str, Any] = {"t": self.t, "dt": float(self.loop.clock.tried_dt), "outcome": outcome.name}
         return write_snapshot(self.target, content | self.file.snapshot(self.state))
 
-    def balance(self) -> None:
-        """Accelerations and tensions that are consistent with positions, velocities and loads.  LineFailed."""
-        step, solver = self.resolution.one.step if self.moves else 1.0, self.solver
-        accelerations: list[Floats] = []
-        for line, model in zip(self.lines, self.model.models, strict=True):
-            accelerations.append(model.ends.acceleration(self.t, 1e-3 * step))
-            model.ends.at_time(self.t)
-            model.sea.at_time(self.t)
-            line.books.velocity[:] = model.ends.velocity
-        self.model.load_bodies(self.t, solver.bodies, self.loaded)
-        self.model.update_water(self.t, self.state.bodies, 0.0, solver.bodies)
-        lengthening: dict[int, Floats] = {}
-        with ExitStack() as stack:
-            for forces_on in self.parts.forces_on:
-                lengthening |= stack.enter_context(forces_on())
-            taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
-        if taken.outcome != Outcome.OK:
-            raise self._explained(taken, 0.0)
 
-    # --- other lines in mid-motion --------------------------------------------------------------------
+def new_run(
+    system: Network, target: Target | None, text: Text, moves: bool,
+    resolution: NetworkResolution | None = None, recording: Recording = ALONE,
+    criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
+) -> Run:  # fmt: skip
+    """A run that stands at its start, or at a checkpoint.
 
-    def renew_solver(self, after: str) -> None:
-        """Another solver in mid-motion, for lines that have changed; after: what, for the text of a failure."""
-        self.gather_events()  # in the order in which they happen
-        bodies, work = self.solver.bodies.copy(), self.solver.body_work.copy()
-        self.make_solver()
-        self.solver.bodies[:], self.solver.body_work[:] = bodies, work
-        self.renew_other()
-        self.evaluate_forces(after)
+    target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
+    motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks for, or the
+    checkpoint says; criterion: one more for zones that move (zones.criteria); changes: loads and motions of these
+    systems hold from some time on.
+    """
+    end = (recording.until or system.require_time().duration) if moves else 0.0
+    changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
+    if recording.source is None:
+        first = _at_start(system, resolution, recording.start, moves, criterion)
+    else:
+        first = _at_checkpoint(system, recording.source, changes, criterion)
+    kept = recording.mode.before is not None and isinstance(target, Path)
+    run = Run(first, _steps(first, moves, end), target, criterion, kept)
+    run.changes, run.notes, run.begun = changes, recording.notes, recording.begun
+    _equip(run, first, system, text, recording)
+    run.recorder = run.file.begin() if recording.source is None else run.continue_file(recording.source)
+    return run
 
-    def change_lines(self, changes: Mapping[int, Callable[[Line], Line]]) -> None:
-        """These lines, by number, are changed so on the same cells; the solver has still to follow."""
-        models = [*self.model.models]
-        for k, change in changes.items():
-            models[k] = replace(models[k], line=change(models[k].line))
-            self.lines[k].use_model(models[k])
-            for part in self.parts:
-                part.change_line(k, change)
-        self.model = replace(self.model, models=tuple(models))
 
-    def go_on_changed(self, numbers: Iterable[int], after: str) -> None:
-        """Another solver, for lines of these numbers that have changed, and that share contact with those.
+def _at_start(
+    system: Network, resolution: NetworkResolution | None, start: Start | None, moves: bool,
+    criterion: UserCriterion | None,
+) -> First:  # fmt: skip
+    """The equilibrium of a system, or its lines as they are placed, unless its start is known."""
+    if start is None:
+        start = start_of(system, build_system(system, resolution=resolution), moves, criterion)
+    state = NetworkState([x.start for x in start.model.models], start.model.body_places)
+    state = (state if start.found is None else start.found.state).copy()
+    scenes = system.scenes_of_lines
+    return First(system, start.model, state, start.found, start.managers, [*scenes.values()], 0, False)
 
-        What that changes of the energy of contact is booked: of all lines, where a part knows that of the last step.
-        """
-        known = next((x for part in self.parts if (x := part.contact_before()) is not None), None)
-        of = range(len(self.lines)) if known is not None else numbers
-        before = {k: float(self.solver.work[k].report[SELF_CONTACT_ENERGY] if known is None else known[k]) for k in of}
-        self.renew_solver(after)
-        for k, energy in before.items():
-            more = float(self.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
-            self.lines[k].books.work[0, b.ZONES] += more
 
-    def go_on_as_attached(self, after: str) -> None:
-        """Go on with the same solver and states, for lines that have changed; after: as of `renew_solver`."""
-        self.gather_events()
-        turns = self.loop.turns
-        self.evaluate_forces(after)
-        self.solver.swap_states(turns)
-        self.loop.stand_after_change()
+def _at_checkpoint(
+    system: Network, source: Path, changes: Sequence[LoadChange[Network]], criterion: UserCriterion | None
+) -> First:
+    """Blank states of the lines of a system, which is loaded as where the checkpoint of a result is."""
+    model = build_system(system, resolution=kept_resolution(system, source))
+    changed = kept_changes(source, len(changes))
+    scenes = system.scenes_of_lines
+    managers = managers_for(scenes, model, criterion)  # as at the start, whatever loads came later
+    if changed:
+        system = changes[changed - 1].scene
+        model = loaded_as(model, system, 0.0)
+    for k, x in managers.items():
+        x.load(model.models[k].ends.moments)
+    state = NetworkState([state_for(x.line) for x in model.models], np.zeros_like(model.body_places))
+    return First(system, model, state, None, managers, [*scenes.values()], changed, True)
 
-    def evaluate_forces(self, after: str) -> None:
-        """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
-        for line, model in zip(self.lines, self.model.models, strict=True):
-            model.ends.at_time(self.t)
-            model.sea.at_time(self.t)
-            line.books.velocity[:] = model.ends.velocity  # a try has moved them on
-        self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
-        taken = self.solver.forces_in_motion(self.state, self.t)
-        if taken.outcome != Outcome.OK:
-            raise LineFailed(taken.line, taken.outcome, self.t, None, after)
-        for note in self.parts.note_forces:
-            note()
+
+def _steps(first: First, moves: bool, end: float) -> NetworkSteps:
+    """The steps of a run to its end (s), 0 where nothing moves, with outputs on the way."""
+    resolution = first.model.resolution
+    one, times = resolution.one, list[float]()
+    turn = min(x.turn for x in resolution.lines.values())
+    if not moves:
+        return NetworkSteps(0.0, [0.0], most_turn=turn)
+    times = output_times(first.scenes[0])
+    if one.every > 1:  # a run to compare with has as many times fewer
+        times = [*times[one.every - 1 : -1 : one.every], times[-1]]
+    if end < times[-1]:
+        times = [*(t for t in times if t < end), end]
+    follow = (one.step, one.shortest) if one.local is not None else (0.0, 0.0)
+    return NetworkSteps(first.network.require_time().rho_inf, [0.0, *times], *follow, turn)
+
+
+def _equip(run: Run, first: First, system: Network, text: Text, recording: Recording) -> None:
+    """Give a run its file, its lines and its parts; system: with the loads of its start."""
+    me = proxy(run)  # for parts: in a circle a run would wait for the search for garbage
+    moves, named = run.moves, dict(zip(first.model.names, first.scenes, strict=True))
+    parts: list[Part] = []
+    payout: RunPayout | None = None
+    if moves and any(x.payout is not None for x in run.model.models):
+        from hybrid.simulation.run_payout import RunPayout
+
+        payout = RunPayout(me)
+        parts.append(payout)
+    run.file = RunFile(me, system, named, text, recording)
+    _add_lines(run, first, recording, payout.lines if payout is not None else {})
+    contact = RunContact(me, recording.touches, run.target is not None)
+    if recording.planes and moves:
+        parts.append(LonePlanes(me, run.loop.counts, system.dimension == 2))
+    shaken = zip(named.items(), run.resolution.lines.values(), strict=True)
+    vibrations = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
+    if moves:
+        run.file.quantities.keep_ranges(run.lines)
+    if first.managers and moves:
+        parts.append(RunZones(me, first.managers, payout))
+    if recording.parts and moves:
+        called = {} if recording.asked is None else recording.asked.scene.form.names
+        parts.append(OwnParts(me, recording.parts, [called.get(name, name) for name in named], payout))
+    if recording.heard is not None and moves:
+        parts.append(ProgressOfRun(me, recording.heard))
+    parts += [
+        LoadChanges(me, run.changes, first.changed),
+        WatchedLines(me),
+        contact,
+        Cuts(me, contact, run.target is None),
+        Failures(me),
+    ]
+    parts += [VibrationsOfLines(vibrations, run.loop.clock), run.file.quantities, run.file.rotations]
+    run.parts = Parts([*parts, RunRecorder(me), FloatingWatch(me, moves)])
+
+
+def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, PayingOut]) -> None:
+    """Give a run its lines, each with what records it; paid: those that are paid out, by number."""
+    points = recording.points or {}
+    run.lines = []
+    every = zip(run.model.names, first.scenes, run.model.models, run.state.lines, strict=True)
+    for k, (name, scene, model, state) in enumerate(every):
+        manager = first.managers.get(k)
+        record = partial(run.file.line_rows, manager=manager) if run.target is not None else None
+        wanted = Wanted(record, points.get(name))
+        shown, outputs = run.file.scene_of(scene), len(run.times)
+        line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))
+        run.lines.append(line)
+        line.manager = manager
+    if not first.resumed:
+        for line in run.lines:
+            line.diagnostics.begin()
+
+
+def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
+    """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
+    scenes = system.scenes_of_lines
+    if moves and system.starts_as_placed:
+        model, managers = zones_as_placed(scenes, model, criterion)
+        return Start(model, None, managers)
+    with at_once():
+        return start_at_rest(system, scenes, model, moves, criterion)
+
+
+def static_system(
+    system: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None
+) -> Run:
+    """Compute the equilibrium of a system under full loads; the rest: as of `new_run`."""
+    run = new_run(system, target, text, False, resolution)
+    run.record_equilibrium()
+    return run

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def _refuse_within_others(
 class RunContact(Part):
     """Contact of the lines of a run, with themselves and with each other."""
 
-    name = "contact"
+    name, older = "contact", MappingProxyType({x: [] for x in ("between", "passed", "met", "let_pass")})
     wants = b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF | b.PARTS_ITSELF | b.HIDES_ITSELF | b.LINES_NEAR
 
     def __init__(self, run: RunOfLines, lets_touch: bool, watches: bool) -> None:
@@ -195,10 +196,6 @@ class RunContact(Part):
         said = {"passed": self._passed, "met": self._met, "let_pass": self._let_pass}
         found |= {name: sorted(list(x) for x in pairs) for name, pairs in said.items()}
         return found if self.shared is None else found | {"contact": self.shared.checkpoint(run.t)}
-
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """In files of an earlier program lines met no others."""
-        return {key: saved.get(key, []) for key in ("between", "passed", "met", "let_pass")}
 
     def restore_joints(self, saved: Mapping[str, Any]) -> bool:
         """Lines touch themselves and each other."""

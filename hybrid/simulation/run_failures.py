@@ -7,7 +7,8 @@ end of a line and its clamp goes with the clamp, and the twist of catenary zones
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -18,27 +19,15 @@ from hybrid.kernels.march.zone_torque import TURN, torsion_energy
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import NO_TURN, State
-from hybrid.kernels.step.accept import MANY
+from hybrid.kernels.step.accept import MANY, TINY
 from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
-from hybrid.simulation.events import (
-    COLLAPSE,
-    CUTS,
-    GIVE_UP,
-    TOUCH_EACH_OTHER,
-    TOUCHES_ITSELF,
-    collapse_text,
-    count_iterations,
-    energy_gains_text,
-    note_cut,
-    note_iterations,
-    note_slack,
-)
-from hybrid.simulation.failure import Stopped, explanation, first_remedy, touch_text
+from hybrid.simulation.events import energy_gains_text, slack_remedy
+from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.parts import Part
+from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.solve.contact import SharedContact
-from hybrid.solve.network_steps import NetworkSteps, Tried
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
 
 SAME_TIME = 1e-6  # of a step: a time so near is now
@@ -47,7 +36,7 @@ SAME_TIME = 1e-6  # of a step: a time so near is now
 class Failures(Part):
     """What may break in a run, and what has."""
 
-    name = "failures"  # a force may be too large after any step
+    name, older = "failures", MappingProxyType({"broken": []})  # a force may be too large after any step
 
     def __init__(self, run: RunOfLines) -> None:
         self._run = run
@@ -101,10 +90,6 @@ class Failures(Part):
     def checkpoint(self) -> dict[str, Any]:
         """What broke."""
         return {"broken": [*self.broken]}
-
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """In files of an earlier program nothing broke."""
-        return {"broken": saved.get("broken", [])}
 
     def restore_joints(self, saved: Mapping[str, Any]) -> bool:
         """Be as after what broke in an earlier part of the run.  ValueError: nothing of the kind may break."""
@@ -172,11 +157,21 @@ def elastic(model: Model, t: float, state: State) -> float:
 
 # --- steps that are cut, that have become very short, or of which none leads on -----------------------
 
-
-class TouchingLines(Protocol):
-    """Contact of the lines of a run."""
-
-    shared: SharedContact | None  # with each other
+# Steps so short, one after the other, after which a run that is only to be compared with is given up.
+GIVE_UP = 10 * MANY
+# What cuts steps, by where the tries are counted (Counts), and what to do about it.
+CAUSES = {
+    "cut_by_gain": ("energy that contact puts in", "shorter cells there"),
+    "cut_by_turn": ("cells that turn by more than a step allows", "cells as long as the bend there, or damping"),
+    "cut_by_newton": ("Newton's method, which does not converge", "more cells where the cable bends, or damping"),
+    "cut_by_error": (
+        "the error that a step makes",
+        "a larger accuracy or time.tolerance, or damping of what is fast there",
+    ),
+}
+# A step in which waves of tension pass so many cells may itself leave a line slack; and by how much shorter one should
+# be that shows whether it does.
+MOST_PASSED, SHORTER = 4.0, 16.0
 
 
 class Cuts(Part):
@@ -184,33 +179,69 @@ class Cuts(Part):
 
     name, wants = "cuts", b.COLLAPSES | b.STEPS_CUT | b.STEPS_SLACK | b.ITERATIONS_CUT
 
-    def __init__(self, run: RunOfLines, contact: TouchingLines, compared: bool) -> None:
+    def __init__(self, run: RunOfLines, contact: RunContact, compared: bool) -> None:
         """contact: of its lines; compared: whether the run is only to be compared with."""
         self._run, self._contact, self._compared = run, contact, compared
 
     def after_step(self) -> None:
-        """Events of steps that were cut."""
-        run = self._run
-        loop, clock, flags = run.loop, run.loop.clock, int(run.loop.counts.notices)
+        """Events of steps that were cut: of each cause for the first."""
+        flags = int(self._run.loop.counts.notices)
         if flags & b.COLLAPSES:
             self._note_collapse()
         if flags & b.STEPS_CUT:
-            turned = run.lines[loop.turned_line]
-            note_cut(clock, float(clock.most_turn), turned.model.length, turned.events, loop.controlled)
+            self._note_turn()
         if flags & b.STEPS_SLACK:
-            slack = run.lines[loop.slack_line]
-            s = float(slack.model.line.s[int(loop.counts.slack_cell)])
-            note_slack(clock, float(slack.books.clock.wave_step), s, slack.events)
+            self._note_slack()
         if flags & b.ITERATIONS_CUT:
-            note_iterations(clock, loop.counts, run.span[1], run.noted)
+            self._note_iterations()
 
     def finish(self, status: str) -> None:
         """How many steps were taken before they had converged, and how many tries contact cost."""
-        run, shared = self._run, self._contact.shared
-        if status == "complete":
-            count_iterations(run.loop.clock, run.loop.counts, run.span[1], run.noted)
+        run, shared, count = self._run, self._contact.shared, self._run.loop.counts
+        short, most = int(count.cut_short), int(count.most_iterations)
+        if status == "complete" and short:
+            steps = f"{short} of {run.steps} steps were taken after {most} Newton iterations that had not converged"
+            run.noted.event(run.t, 0.0, run.span[1], "iterations cut", steps, value=float(short), threshold=float(most))
         if shared is not None and (tries := shared.given_up):
             run.note("steps cut", energy_gains_text(tries))
+
+    def _note_turn(self) -> None:
+        """An end turns too far in a fixed step, which was cut."""
+        loop, clock = self._run.loop, self._run.loop.clock
+        if not loop.controlled:
+            line, angle, step = self._run.lines[loop.turned_line], float(clock.cut_angle), float(clock.cut_step)
+            text = (
+                f"an end turns by {angle:.3g} rad in a step of {step:.4g} s: this step and others like it are cut, so "
+                f"that it turns by at most {clock.most_turn:g} rad in each and no turn is lost; time.step: "
+                f"{0.3 * step / angle:.2g} follows it"
+            )
+            line.events.event(float(clock.previous), 0.0, line.model.length, "steps cut", text)
+        clock.mute_cuts = 1.0
+
+    def _note_slack(self) -> None:
+        """A catenary was slack in a step that is too long for its waves, and not in shorter ones."""
+        loop, clock = self._run.loop, self._run.loop.clock
+        line, taken = self._run.lines[loop.slack_line], float(clock.last_dt)
+        s = float(line.model.line.s[int(loop.counts.slack_cell)])
+        text = (
+            f"a catenary loses its tension here in a step of {clock.slack_step:.4g} s, and keeps it in one of "
+            f"{taken:.4g} s: the step is too long for waves, which pass a cell in {line.books.clock.wave_step:.2g} s; "
+            f"this step and others like it are cut; time.step: {taken:.2g} follows them"
+        )
+        line.events.event(float(clock.now), s, s, "steps cut", text)
+        clock.mute_slack = 1.0
+
+    def _note_iterations(self) -> None:
+        """A step was taken in all the Newton iterations that it may take though these had not converged."""
+        run, clock = self._run, self._run.loop.clock
+        most = int(run.loop.counts.most_iterations)
+        left = "though the next would still have" if most > 1 else "which"  # from one alone the next is not known
+        text = (
+            f"a step was taken after {most} Newton iterations, {left} changed it by {clock.correction:.2g} (relative), "
+            f"and so are others like it: most_iterations bounds their cost; steps/correction has what each left out; "
+            f"a shorter time.step or more iterations leave less"
+        )
+        run.noted.event(run.t, 0.0, run.span[1], "iterations cut", text, threshold=float(most))
 
     @property
     def _touching(self) -> str:
@@ -218,38 +249,87 @@ class Cuts(Part):
         shared = self._contact.shared
         pairs = shared.points_between() if shared is not None else []
         if any(a != c for (a, _), (c, _) in pairs):
-            return TOUCH_EACH_OTHER
-        own = (line.contact for line in self._run.lines)
-        return TOUCHES_ITSELF if pairs or any(x is not None and x.touches for x in own) else ""
+            return "; lines touch each other there, and contact: {between: []} leaves that out"
+        if pairs or any(x.contact is not None and x.contact.touches for x in self._run.lines):
+            return "; the line touches itself there, and contact: {self: false} leaves that out"
+        return ""
 
     def _note_collapse(self) -> None:
         """Steps have become so short that the run may not end: an event; one to be compared with stops."""
-        run = self._run
-        count, clock = run.loop.counts, run.loop.clock
+        run, count = self._run, self._run.loop.counts
         number, where = run.loop.last_cut
-        line = run.lines[max(number, 0)]
+        line, tiny = run.lines[max(number, 0)], int(count.tiny_steps)
         s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
-        cuts, tiny = {cause: int(getattr(count, name)) for cause, name in CUTS.items()}, int(count.tiny_steps)
-        text = collapse_text(tiny, run.last_step, float(clock.longest), cuts, s, self._touching)
+        text = (
+            f"the last {tiny} steps were shorter than {TINY:g} of the longest, {run.loop.clock.longest:.3g} s; the "
+            f"last took {run.last_step:.3g} s"
+        )
+        cuts = {name: int(getattr(count, name)) for name in CAUSES}
+        most = max(cuts, key=lambda name: cuts[name])
+        if cuts[most]:
+            by = sorted(((n, CAUSES[name][0]) for name, n in cuts.items() if n), key=lambda x: -x[0])
+            given = ", ".join(f"{cause} ({n})" for n, cause in by)
+            text += f"; tries were cut by {given}, last at s = {s:.6g} m: {CAUSES[most][1]}{self._touching}"
+        else:
+            text += f"; they grow no faster{self._touching}"
         if tiny == MANY:
-            line.events.event(run.t, s, s, COLLAPSE, text, value=run.last_step)
+            line.events.event(run.t, s, s, "steps collapse", text, value=run.last_step)
         if self._compared and tiny >= GIVE_UP:
             raise LineFailed(line.number, Outcome.COLLAPSED, run.t, s, text)
 
     def explains(self, taken: NetworkTaken, dt: float) -> LineFailed:
         """Why no step of dt (s) leads on; 0: why there are no accelerations."""
-        run, solver = self._run, self._run.solver
-        if taken.line < 0:
-            detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
-            if dt == 0.0:
-                detail = "no accelerations are consistent with the shape and the loads"
+        run, k = self._run, taken.line
+        detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
+        if dt == 0.0:
+            detail = "no accelerations are consistent with the shape and the loads"
+        if k < 0:
             return LineFailed(-1, taken.outcome, run.t, None, detail + self._touching)
-        k, tried = taken.line, Tried(taken.outcome, taken.iterations, taken.correction, taken.where)
-        line, model, now = run.lines[k], run.model.models[k], run.state.lines[k]
-        x = Stopped(
-            model, now, run.other.lines[k] if dt else now, run.loop.clock, run.loop.counts, tried, dt,
-            float(line.books.clock.wave_step), line.manager is not None, max(solver.joints[k]) < 0,
-            touch_text(line.contact, model) or self._touching,
-        )  # fmt: skip
-        s = float(model.line.s[x.node])
-        return LineFailed(k, taken.outcome, run.t, s, explanation(x), first=first_remedy(x))
+        line, model, count = run.lines[k], run.model.models[k], run.loop.counts
+        node = min(max(taken.where, 0), model.line.s.size - 1)
+        s, first = float(model.line.s[node]), ""
+        if taken.outcome == Outcome.SLACK:
+            detail, first = self._slack(k, node, dt)
+        detail += self._own_touch(line) or self._touching
+        if 0 < count.most_iterations <= count.taken:
+            detail += f"; the {int(count.most_iterations)} iterations that a step may take are used up"
+            first = "restore() and a shorter step, or more iterations (most_iterations)"
+        ends = model.ends.at_time(run.t + dt)
+        apart = float(np.linalg.norm(ends.position[1] - ends.position[0]))
+        if max(run.solver.joints[k]) < 0 and model.inextensible and apart >= model.length:
+            longest = f"the cable does not stretch beyond {model.length:.6g} m"
+            detail += f"; the ends are then {apart:.6g} m apart, and {longest}"
+        return LineFailed(k, taken.outcome, run.t, s, detail, first=first)
+
+    def _slack(self, k: int, node: int, dt: float) -> tuple[str, str]:
+        """Over which steps a catenary was slack, and what to try first: shorter steps, or what carries it."""
+        run, clock = self._run, self._run.loop.clock
+        line, model, before = run.lines[k], run.model.models[k], (run.other if dt else run.state).lines[k]
+        planned, waves = float(clock.until - clock.begin), float(line.books.clock.wave_step)
+        tension = before.T[min(node, before.T.size - 1)]
+        over = f", tried after longer ones from {planned:.3g} s on," if dt < 0.99 * planned else ""
+        text = (
+            f"the step of {dt:.3g} s{over} that starts at this time ends with a tension of {tension:.3g} N; "
+            f"a wave passes a cell in {waves:.2g} s"
+        )
+        too_long = run.steps > 0 and planned > MOST_PASSED * waves  # so they did in the steps before
+        if too_long:
+            step = max(planned / SHORTER, waves)
+            first = f"time.step: {step:.2g} from the start, because the steps before may be to blame, not the line"
+        else:
+            text += ": the steps are short enough, the line is slack"
+            first = slack_remedy(model, Outcome.SLACK, float(model.line.s[node]))
+        if line.manager is not None:
+            text += "; model.force_catenary keeps it from becoming a rod"
+        return text, first
+
+    @staticmethod
+    def _own_touch(line: LineResult) -> str:
+        """What is said of a line that touches itself where a step fails; empty: it does not."""
+        if line.contact is None or not line.contact.touches:
+            return ""
+        p, q = sorted(float(line.model.line.s[k]) for k in line.contact.deepest)
+        return (
+            f"; contact of the line with itself is computed, s = {p:.6g} m and s = {q:.6g} m touch: "
+            f"shorter cells there may help, and contact: {{self: false}} leaves it out"
+        )

@@ -1,39 +1,70 @@
-"""What parts of a run of lines may ask of it, and have it do: contact, failures, loads that change, payout.
+"""A run between two steps: its arrays, and how they change; with the parts that change loads and listen.
 
-A part names this and no run, so that the run stands above all of its parts.
+Parts name this, and not the run whose steps they are asked in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
+from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import DONE, SPRING
-from hybrid.kernels.state.report import SELF_CONTACT
-from hybrid.kernels.state.state import Floats, Line, Work
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import SELF_CONTACT, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.state import Floats, Line, Moves, Work
 from hybrid.model.build import Model
 from hybrid.model.contents import touching
+from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import unclamped, without_hold
 from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.scene.base import Table
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
+from hybrid.simulation.diagnostics import LineStep
+from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_result import LineResult, LineStep
-from hybrid.simulation.parts import Part, Parts
+from hybrid.simulation.line_result import WAITING, LineResult
+from hybrid.simulation.parts import Part, Parts, Sampled
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
+from hybrid.simulation.run_quantities import RunQuantities
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.stepper import NetworkState
+from hybrid.solve.network_steps import MOST_SAMPLED, NetworkSteps
+from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
+from hybrid.store.checkpoint import digest_of
+from hybrid.store.format import Target
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
+from hybrid.zones.criteria import UserCriterion
+
+AnyRecorder = Recorder | ComparisonRecorder
 
 
-class RunOfLines(Protocol):
-    """A run between two steps; what is writable here, parts change, and the solver follows (`make_solver`)."""
+class FileOfRun(Protocol):
+    """The file of a run, as the run that grows in it needs it."""
+
+    quantities: RunQuantities
+
+    @property
+    def span(self) -> tuple[float, float]: ...
+
+    @property
+    def noted(self) -> Sink: ...
+
+    def gather(self) -> None: ...
+
+
+class RunOfLines:
+    """A run between two steps; what stands here parts change, and the solver follows (`make_solver`)."""
 
     network: Network
     model: NetworkModel
@@ -44,67 +75,270 @@ class RunOfLines(Protocol):
     lines: list[LineResult]
     scenes: list[LineScene]
     resolution: NetworkResolution
-    loaded: float  # s, loads that have stopped by then act no more
+    parts: Parts
+    file: FileOfRun
+    recorder: AnyRecorder
+    target: Target | None  # None: it is only to be compared with
+    criterion: UserCriterion | None  # one more for zones that move
+    times: Sequence[float]  # s, of outputs after the first
+    moves: bool  # whether it is no equilibrium
+    changes: Sequence[LoadChange[Network]] = ()  # of loads
     rest: Floats  # bodies when the motion began
-    found: LinesAtRest | None
+    found: LinesAtRest | None  # from which it starts
+    loaded = 0.0  # s, loads that have stopped by then act no more
+    leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
+    cpu = 0.0  # s, of the processor, in earlier parts of the run
+    _moved: Sequence[Moves] = ()  # by which ends move in compiled steps
+    _loaded = np.nan  # `loaded`, of the loads that act on bodies in compiled steps
+
+    # --- what it is -----------------------------------------------------------------------------------
 
     @property
-    def parts(self) -> Parts: ...
+    def t(self) -> float:
+        """Time of the state, s."""
+        return float(self.loop.clock.now)
 
     @property
-    def recorder(self) -> Recorder | ComparisonRecorder: ...
+    def steps(self) -> int:
+        """Steps so far."""
+        return int(self.loop.counts.steps)
 
     @property
-    def noted(self) -> Sink: ...
+    def last_step(self) -> float:
+        """Length, s, of the step that led to the state; 0: it is a start."""
+        return float(self.loop.clock.last_dt)
 
     @property
-    def span(self) -> tuple[float, float]: ...
-
-    def note(self, kind: str, text: str, **more: float) -> None: ...
-
-    @property
-    def t(self) -> float: ...
+    def last_rho(self) -> float:
+        """Its spectral radius."""
+        return float(self.loop.clock.last_rho)
 
     @property
-    def steps(self) -> int: ...
+    def interval(self) -> float:
+        """What the step took (s) that led to the state, of which outputs within the next are made, too; 0: unknown."""
+        return float(self.loop.clock.now - self.loop.clock.previous)
 
     @property
-    def last_step(self) -> float: ...
+    def touches(self) -> bool:
+        """Whether contact of a line with itself is computed."""
+        return any(model.line.bits & SELF_CONTACT for model in self.model.models)
 
     @property
-    def last_rho(self) -> float: ...
+    def turned(self) -> bool:
+        """Whether moments are given at points."""
+        return any(getattr(point, "moment", None) is not None for point in self.network.points.values())
 
     @property
-    def touches(self) -> bool: ...
+    def files(self) -> dict[str, str]:
+        """Digests of the files of motions and loads, by path, of all that holds at some time."""
+        found = files_of(self.network)
+        for x in self.changes:
+            found |= files_of(x.scene)
+        return found
 
     @property
-    def asks_quantities(self) -> bool: ...
+    def span(self) -> tuple[float, float]:
+        """Arc lengths (m) of its events."""
+        return self.file.span
 
-    def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
+    @property
+    def noted(self) -> Sink:
+        """What notes events of the whole run."""
+        return self.file.noted
 
-    def start_from(self, bodies: Floats) -> None: ...
+    def note(self, kind: str, text: str, **more: float) -> None:
+        """Note an event of the whole run, now."""
+        self.noted.event(self.t, *self.span, kind, text, **more)
 
-    def make_solver(self) -> None: ...
+    # --- solver and steps -------------------------------------------------------------------------------
 
-    def renew_other(self) -> None: ...
+    def start_from(self, bodies: Floats) -> None:
+        """Take the added mass of members of bodies that were at rest (B, STATE) when the motion began."""
+        self.rest = bodies.copy()
+        for body, row in zip(self.model.bodies, bodies, strict=False):
+            body.set_added_mass(row)
 
-    def ends_of_now(self) -> None: ...
+    def make_solver(self) -> None:
+        """A solver for the model as it is."""
+        for part in self.parts:
+            part.fit_lines()
+        remeshes = any(part.remeshes for part in self.parts)
+        contacts, shared = next(y for part in self.parts if (y := part.touching(remeshes)) is not None)
+        lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
+        for line, x in zip(self.lines, lines, strict=True):
+            line.held = np.minimum(x.ends.held, 1)
+        self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
+        self._make_room(self.solver)
+        self.solver.keep_books([line.books for line in self.lines])
+        for use_solver in self.parts.use_solver:
+            use_solver(self.model, self.solver)
+        if self.loop.controlled:
+            self.solver.allowed[:] = self.resolution.allowed
+        self.loop.bind_members(self.model.members_of(self.solver.bodies))
+        self._moved, self._loaded = [], np.nan
 
-    def restart_steps(self) -> None: ...
+    def _make_room(self, solver: NetworkSolver) -> None:
+        """Room for samples of the lines and bodies as they are."""
+        rows = max(1, min(WAITING, MOST_SAMPLED // sum(line.sample_size for line in self.lines)))
+        for line in self.lines:
+            line.make_room(rows)
+        self.loop.make_room(rows, len(solver.body_work))
 
-    def balance(self) -> None: ...
+    @property
+    def asks_quantities(self) -> bool:
+        """Whether quantities by name are among the outputs, which are found of one mesh at a time."""
+        return bool(self.file.quantities.fields)
 
-    def renew_solver(self, after: str) -> None: ...
+    def adopt_cells(self, number: int, model: Model, work: Work) -> None:
+        """Go on with other cells of a line, which steps have changed to."""
+        models, line = [*self.model.models], self.lines[number]
+        models[number] = model
+        self.model = replace(self.model, models=tuple(models))
+        self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
+        line.adopt_cells(model)
+        for part in self.parts:
+            part.adopt_cells(number, model.line)
 
-    def change_lines(self, changes: Mapping[int, Callable[[Line], Line]]) -> None: ...
+    def renew_other(self) -> None:
+        """Room for the state after the next step, of lines as they are now."""
+        self.other = self.state.copy()
 
-    def go_on_changed(self, numbers: Iterable[int], after: str) -> None: ...
+    def place_ends(self, t: float) -> None:
+        """Ends, seas and loads on bodies are as at t (s), wherever a try has moved them on to."""
+        for line, model in zip(self.lines, self.model.models, strict=True):
+            model.ends.at_time(t)
+            model.sea.at_time(t)
+            line.books.velocity[:] = model.ends.velocity
+        self.model.load_bodies(t, self.solver.bodies, self.loaded)
 
-    def go_on_as_attached(self, after: str) -> None: ...
+    def ends_of_now(self) -> None:
+        """Let ends and sea be as they are now: compiled steps have moved them without Python."""
+        if not self.loop.counts.asks & b.ASK_BEFORE:
+            for model in self.model.models:
+                model.ends.at_time(self.t)
+                model.sea.at_time(self.t)
 
-    def gather_events(self) -> None: ...
+    def _attach(self) -> None:
+        """Steps lead from the state of now, with ends that move as they do now."""
+        loop, solver = self.loop, self.solver
+        loop.counts.asks = 0
+        if loop.attach(solver, self.state, self.other):
+            for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
+                line.attach(solver, (old, new), loop.clock, loop.counts)
+        for attach in self.parts.attach:
+            attach(loop)
+        moves = [model.ends.moves() for model in self.model.models]
+        if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
+            self._moved = moves
+            loop.move(solver, [model.ends.moves_from_here() for model in self.model.models])
+        if self._loaded != self.loaded:
+            self._loaded = self.loaded
+            loop.load(*table_of_loads(self.model.growing_loads(self.loaded)))
 
-    def output_due(self) -> None: ...
+    def _explained(self, taken: NetworkTaken, dt: float) -> LineFailed:
+        """Why no step of dt (s) leads on; 0: why there are no accelerations."""
+        return next(x for part in self.parts if (x := part.explains(taken, dt)) is not None)
+
+    def restart_steps(self) -> None:
+        """Loads, or what holds the lines, are others now: accelerations jump."""
+        self.balance()
+        self.loop.restart()
+
+    def balance(self) -> None:
+        """Accelerations and tensions that are consistent with positions, velocities and loads.  LineFailed."""
+        step, solver = self.resolution.one.step if self.moves else 1.0, self.solver
+        accelerations = [model.ends.acceleration(self.t, 1e-3 * step) for model in self.model.models]
+        self.place_ends(self.t)
+        self.model.update_water(self.t, self.state.bodies, 0.0, solver.bodies)
+        lengthening: dict[int, Floats] = {}
+        with ExitStack() as stack:
+            for forces_on in self.parts.forces_on:
+                lengthening |= stack.enter_context(forces_on())
+            taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
+        if taken.outcome != Outcome.OK:
+            raise self._explained(taken, 0.0)
+
+    # --- other lines in mid-motion --------------------------------------------------------------------
+
+    def renew_solver(self, after: str) -> None:
+        """Another solver in mid-motion, for lines that have changed; after: what, for the text of a failure."""
+        self.gather_events()  # in the order in which they happen
+        bodies, work = self.solver.bodies.copy(), self.solver.body_work.copy()
+        self.make_solver()
+        self.solver.bodies[:], self.solver.body_work[:] = bodies, work
+        self.renew_other()
+        self.evaluate_forces(after)
+
+    def change_lines(self, changes: Mapping[int, Callable[[Line], Line]]) -> None:
+        """These lines, by number, are changed so on the same cells; the solver has still to follow."""
+        models = [*self.model.models]
+        for k, change in changes.items():
+            models[k] = replace(models[k], line=change(models[k].line))
+            self.lines[k].use_model(models[k])
+            for part in self.parts:
+                part.change_line(k, change)
+        self.model = replace(self.model, models=tuple(models))
+
+    def go_on_changed(self, numbers: Iterable[int], after: str) -> None:
+        """Another solver, for lines of these numbers that have changed, and that share contact with those.
+
+        What that changes of the energy of contact is booked: of all lines, where a part knows that of the last step.
+        """
+        known = next((x for part in self.parts if (x := part.contact_before()) is not None), None)
+        of = range(len(self.lines)) if known is not None else numbers
+        before = {k: float(self.solver.work[k].report[SELF_CONTACT_ENERGY] if known is None else known[k]) for k in of}
+        self.renew_solver(after)
+        for k, energy in before.items():
+            more = float(self.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+            self.lines[k].books.work[0, b.ZONES] += more
+
+    def go_on_as_attached(self, after: str) -> None:
+        """Go on with the same solver and states, for lines that have changed; after: as of `renew_solver`."""
+        self.gather_events()
+        turns = self.loop.turns
+        self.evaluate_forces(after)
+        self.solver.swap_states(turns)
+        self.loop.stand_after_change()
+
+    def evaluate_forces(self, after: str) -> None:
+        """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
+        self.place_ends(self.t)
+        taken = self.solver.forces_in_motion(self.state, self.t)
+        if taken.outcome != Outcome.OK:
+            raise LineFailed(taken.line, taken.outcome, self.t, None, after)
+        for note in self.parts.note_forces:
+            note()
+
+    # --- outputs ----------------------------------------------------------------------------------------
+
+    def output_due(self) -> None:
+        """Make the output that is due now, if one is: before loads, or what holds lines, become others."""
+        if self.loop.due:
+            self._attach()
+            self._output()
+
+    def gather_events(self) -> None:
+        """Record the events of the lines, in the result of the system with their names, as they happened."""
+        for gather in self.parts.gather:
+            gather()
+        self.file.gather()
+
+    def _output(self) -> None:
+        """Record points, bodies and lines as they are, where an output is due."""
+        while not self.loop.sample():
+            self.record_samples()
+        self.record_samples()
+
+    def record_samples(self) -> None:
+        """Record what has been sampled of points, bodies and lines."""
+        count = int(self.loop.counts.samples)
+        if not count:
+            return
+        self.loop.counts.samples = 0
+        states = [line.sampled(count) for line in self.lines]
+        seen = Sampled(states, self.loop.body_samples[:count])
+        for at_output in self.parts.at_output:
+            at_output(seen)
 
 
 class Heard(NamedTuple):
@@ -189,7 +423,7 @@ def _line_as(name: str, now: Model, later: Model, system: Network, t: float) -> 
 class LoadChanges(Part):
     """Other loads, and other motions of points and bodies, from some times on."""
 
-    name = "loads"
+    name, older = "loads", MappingProxyType({"changes": 0})
 
     def __init__(self, run: RunOfLines, changes: Sequence[LoadChange[Network]], made: int) -> None:
         """changes: in their order; made: how many of them already hold."""
@@ -227,10 +461,6 @@ class LoadChanges(Part):
         """How many hold."""
         return {"changes": self._made}
 
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """In files of an earlier program none did."""
-        return {"changes": saved.get("changes", 0)}
-
 
 class ProgressOfRun(Part):
     """Who listens hears how far a run is, and may end it."""
@@ -247,3 +477,8 @@ class ProgressOfRun(Part):
         heard.reporter(run.t, run.steps, iterations, run.model.models[0].zones, finished, run.touches)
         if not finished and heard.interrupted():
             raise KeyboardInterrupt
+
+
+def files_of(scene: Table) -> dict[str, str]:
+    """Digests of the files that a scene reads, by path."""
+    return {path: digest_of(Path(path)) for path in scene.named_files()}

@@ -24,7 +24,6 @@ from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.model.payout import FEWEST_CELLS
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.failure import winch_text
 from hybrid.simulation.parts import Part
 from hybrid.simulation.payout import Before, PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
@@ -269,7 +268,8 @@ class RunPayout(Part):
         run, changed = self._run, []
         for k, x in self.lines.items():
             if x.at_its_end:
-                text = winch_text(x)
+                least, most = x.plan.shortest, x.plan.longest
+                text = f"{x.length:.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
                 raise LineFailed(k, Outcome.WINCH_AT_END, run.t, float(run.model.models[k].line.s[-1]), text)
             if x.due and k in self._nodes and self._nodes[k].fits:
                 self._nodes[k].change()

@@ -7,22 +7,25 @@ that of a line alone.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import ComputationError
+from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.machine.cache import cache_folder
-from hybrid.kernels.state import books as b
-from hybrid.kernels.state.report import SELF_CONTACT
-from hybrid.kernels.state.state import Floats
-from hybrid.model.network import NetworkModel, NetworkResolution
+from hybrid.kernels.state.books import WORKS
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import OPTIONAL_STATE, Floats
+from hybrid.model.failure import weaknesses
+from hybrid.model.sections import OutputPoints
 from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
@@ -30,26 +33,45 @@ from hybrid.scene.root import ShortForm
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import Sink
 from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.parts import Part, Parts
-from hybrid.simulation.restart import LoadChange, changes_text
+from hybrid.simulation.own_parts import RunPart
+from hybrid.simulation.parts import Part, Sampled
+from hybrid.simulation.restart import (
+    FIRST_REPORT,
+    FIRST_WORKS,
+    LoadChange,
+    as_of_line,
+    changes_text,
+    is_of_cable,
+    of_line,
+    program,
+    refused,
+    resolution_tree,
+)
 from hybrid.simulation.result_file import mesh_fields, note_neglected_bending, places_of_elevation, result_header
-from hybrid.simulation.run_checkpoint import files_of
-from hybrid.simulation.run_of_lines import RunOfLines
-from hybrid.simulation.run_points import Sampled, fields_of, gauges_of, values_of
-from hybrid.simulation.run_quantities import Rotations, RunQuantities, fields_of_pairs, values_of_pairs
+from hybrid.simulation.run_of_lines import AnyRecorder, Heard, RunOfLines
+from hybrid.simulation.run_quantities import (
+    Rotations,
+    RunQuantities,
+    fields_of,
+    fields_of_pairs,
+    gauges_of,
+    values_of,
+    values_of_pairs,
+)
+from hybrid.simulation.zones_at_rest import Start
 from hybrid.solve.lines_at_rest import LinesAtRest
-from hybrid.solve.network_steps import NetworkSteps
+from hybrid.solve.network_steps import no_extremes
 from hybrid.solve.stepper import LineFailed, NetworkState
-from hybrid.store.checkpoint import Checkpoint
-from hybrid.store.format import Field, Header, Target, Text, made
+from hybrid.store.checkpoint import Checkpoint, read_checkpoint
+from hybrid.store.format import Field, Header, Text, made
+from hybrid.store.hdf5_file import opened
+from hybrid.store.integrity import matched
 from hybrid.store.recorder import Rows
 from hybrid.store.records import PENDING, RODS_AT_START
 from hybrid.store.stored_rows import ComparisonRecorder
-from hybrid.store.writer import Recorder, WriteMode
+from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 from hybrid.zones.at_start import reasons_at_start
 from hybrid.zones.manager import DomainManager
-
-AnyRecorder = Recorder | ComparisonRecorder
 
 
 class Asked(NamedTuple):
@@ -59,29 +81,34 @@ class Asked(NamedTuple):
     changes: Sequence[LoadChange[Any]] = ()
 
 
-class Filing(Protocol):
-    """What of its arguments a run keeps its file by."""
+class Recording(NamedTuple):
+    """What there is beside a run: around it, before it and after it.
 
-    @property
-    def mode(self) -> WriteMode: ...
-    @property
-    def pending(self) -> str: ...
-    @property
-    def asked(self) -> Asked | None: ...
-    @property
-    def source(self) -> Any: ...
+    mode: how a file is written; source: the result to go on with, from its checkpoint, in place of a start; pending:
+    what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run; begun:
+    called behind the first output; planes: whether lines that are joined to nothing are computed in the planes in
+    which they lie; start: the first state, if it is known; points: of outputs of lines by name, None: those of
+    their scenes; until: s, its end, if it comes before that of the scene; touches: whether contact begins by itself
+    where lines come near themselves, else that is only noticed; asked: what the network was made of, by whose names it
+    gets its file; parts: of the user's own, of which the run has copies; heard: who hears of a motion, and may end it.
+    """
+
+    mode: WriteMode = AT_ONCE
+    source: Path | None = None
+    pending: str = ""
+    notes: Sequence[tuple[str, str]] = ()
+    begun: Callable[[Any], None] | None = None
+    planes: bool = False
+    start: Start | None = None
+    points: Mapping[str, OutputPoints] | None = None
+    until: float | None = None
+    touches: bool = True
+    asked: Asked | None = None
+    parts: Sequence[RunPart] = ()
+    heard: Heard | None = None
 
 
-class FiledRun(RunOfLines, Protocol):
-    """A run, as its file sees it."""
-
-    target: Target | None
-    times: Sequence[float]
-    changes: Sequence[LoadChange[Any]]
-    recorder: AnyRecorder
-
-    @property
-    def files(self) -> Mapping[str, str]: ...
+ALONE = Recording()
 
 
 class RunFile:
@@ -91,7 +118,7 @@ class RunFile:
     """
 
     def __init__(
-        self, run: FiledRun, system: Network, scenes: Mapping[str, LineScene], text: Text, asks: Filing
+        self, run: RunOfLines, system: Network, scenes: Mapping[str, LineScene], text: Text, asks: Recording
     ) -> None:
         """system: with the loads of its start; scenes: of its lines by name; text: the scene, as the file has it."""
         scene = asks.asked.scene if asks.asked is not None else None
@@ -249,56 +276,17 @@ WORK = 10_000_000
 READ_EVERY = 0.01  # s of the wall, after which the time of the processor is read again
 
 
-class RecordedRun:
-    """A run as its file grows: where it is, its lines, and what is written of them."""
+class RecordedRun(RunOfLines):
+    """A run as its file grows: what is written of its lines."""
 
-    network: Network
-    model: NetworkModel
-    resolution: NetworkResolution
-    loop: NetworkSteps
-    target: Target | None  # None: it is only to be compared with
     kept: bool  # whether it writes checkpoints
     file: RunFile
-    lines: list[LineResult]
-    recorder: AnyRecorder
-    parts: Parts
-    changes: Sequence[LoadChange[Network]] = ()  # of loads
-    cpu = 0.0  # s, of the processor, in earlier parts of the run
     read_every = READ_EVERY
     _begin: float  # s, of the processor, when the run began, were it all made now
     _logged = 0.0  # s, likewise, when steps were logged last
     _read = -np.inf, 0.0  # s of the wall, when the time of the processor was read last, and that
     _checked = -1  # steps at the last checkpoint
     _between = False  # whether the state is that between two steps
-
-    def content(self) -> Mapping[str, Any]:
-        """What a checkpoint keeps."""
-        raise NotImplementedError
-
-    @property
-    def t(self) -> float:
-        """Time of the state, s."""
-        return float(self.loop.clock.now)
-
-    @property
-    def steps(self) -> int:
-        """Steps so far."""
-        return int(self.loop.counts.steps)
-
-    @property
-    def last_step(self) -> float:
-        """Length, s, of the step that led to the state; 0: it is a start."""
-        return float(self.loop.clock.last_dt)
-
-    @property
-    def last_rho(self) -> float:
-        """Its spectral radius."""
-        return float(self.loop.clock.last_rho)
-
-    @property
-    def interval(self) -> float:
-        """What the step took (s) that led to the state, of which outputs within the next are made, too; 0: unknown."""
-        return float(self.loop.clock.now - self.loop.clock.previous)
 
     def stand_at(self, t: float, steps: int, last_step: float, last_rho: float, interval: float) -> None:
         """Be between two steps, at t (s)."""
@@ -308,33 +296,6 @@ class RecordedRun:
             line.books.counts.repeats = 0  # of a step that was tried when it was taken back
         self.loop.stand_between(interval, self.resolution.one.step)
         self._logged = self._spent()
-
-    @property
-    def turned(self) -> bool:
-        """Whether moments are given at points."""
-        return any(getattr(point, "moment", None) is not None for point in self.network.points.values())
-
-    @property
-    def files(self) -> dict[str, str]:
-        """Digests of the files of motions and loads, by path, of all that holds at some time."""
-        found = files_of(self.network)
-        for x in self.changes:
-            found |= files_of(x.scene)
-        return found
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Arc lengths (m) of its events."""
-        return self.file.span
-
-    @property
-    def noted(self) -> Sink:
-        """What notes events of the whole run."""
-        return self.file.noted
-
-    def note(self, kind: str, text: str, **more: float) -> None:
-        """Note an event of the whole run, now."""
-        self.noted.event(self.t, *self.span, kind, text, **more)
 
     @property
     def is_due(self) -> bool:
@@ -362,34 +323,11 @@ class RecordedRun:
         if new:
             begins_late = self._checked < 0 and self.recorder.is_late
             self.cpu, self._checked = clock_now() - self._begin, self.steps
-            self.recorder.checkpoint(self.content)
+            self.recorder.checkpoint(partial(content, self))
             if begins_late and not self.recorder.due:
                 return
         if not last:
             self.recorder.flush(made)
-
-    def gather_events(self) -> None:
-        """Record the events of the lines, in the result of the system with their names, as they happened."""
-        for gather in self.parts.gather:
-            gather()
-        self.file.gather()
-
-    def _output(self) -> None:
-        """Record points, bodies and lines as they are, where an output is due."""
-        while not self.loop.sample():
-            self.record_samples()
-        self.record_samples()
-
-    def record_samples(self) -> None:
-        """Record what has been sampled of points, bodies and lines."""
-        count = int(self.loop.counts.samples)
-        if not count:
-            return
-        self.loop.counts.samples = 0
-        states = [line.sampled(count) for line in self.lines]
-        seen = Sampled(states, self.loop.body_samples[:count])
-        for at_output in self.parts.at_output:
-            at_output(seen)
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
@@ -399,13 +337,6 @@ class RecordedRun:
         for part in self.parts:
             part.finish(status)
         self.file.close(status, message)
-
-    def ends_of_now(self) -> None:
-        """Let ends and sea be as they are now: compiled steps have moved them without Python."""
-        if not self.loop.counts.asks & b.ASK_BEFORE:
-            for model in self.model.models:
-                model.ends.at_time(self.t)
-                model.sea.at_time(self.t)
 
     def _spent(self) -> float:
         """Processor time of the run, s, to within `read_every`: to read it may take as long as ten steps."""
@@ -438,11 +369,6 @@ class RecordedRun:
             self.keep(last=True)
         self._close(status, message or f"{self.steps} steps")
 
-    @property
-    def touches(self) -> bool:
-        """Whether contact of a line with itself is computed."""
-        return any(model.line.bits & SELF_CONTACT for model in self.model.models)
-
 
 class RunRecorder(Part):
     """What records the outputs and the steps of a run."""
@@ -467,3 +393,144 @@ class RunRecorder(Part):
         """Keep a checkpoint where one is due; the last is kept where the file is closed."""
         if not finished:
             self._run.keep()
+
+
+REFERENCES = "first_places", "first_turns"  # of outputs of a line
+
+
+# Kept of parts that a run does not have.
+WITHOUT: Mapping[str, Any] = {"zones": {}, "planes": {}}
+
+
+def checkpoint(run: RecordedRun) -> dict[str, Any]:
+    """What the next steps depend on, between two steps, with no output waiting: named arrays and plain values."""
+    lines = {
+        line.name: line.checkpoint(work, run.t) | {"state": state._asdict(), "rho": float(line.books.clock.last_rho)}
+        for line, work, state in zip(run.lines, run.solver.work, run.state.lines, strict=True)
+    }
+    found: dict[str, Any] = {
+        "t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho, "loaded": run.loaded,
+        "interval": run.interval, "worked": run.loop.worked[1, :, :SPRING],
+        "leg": [*run.leg], "cpu": run.cpu, "bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING],
+        "lines": lines, "rest": run.rest, "control": run.loop.control(), "cuts": run.loop.cuts(),
+        **WITHOUT,
+    }  # fmt: skip
+    for part in run.parts:
+        found |= part.checkpoint()
+    return found
+
+
+def restore(run: RecordedRun, saved: Mapping[str, Any]) -> None:
+    """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
+    if is_of_cable(saved):
+        saved = as_of_line(saved, run.lines[0].name, run.model.models[0], weaknesses(run.network))
+    given, saved = saved, _of_today(run, saved)
+    joined = [part.restore_joints(saved) for part in reversed(run.parts)]
+    if any([*(part.restore_cells(saved) for part in reversed(run.parts)), *joined]):
+        run.make_solver()
+    template = checkpoint(run) | {"control": None, "planes": None}
+    for part in run.parts:
+        template |= dict.fromkeys(() if part.is_of_form else part.checkpoint())
+    saved["lines"] = lines_of_today(saved.get("lines"), template["lines"], saved["rho"])
+    for line in template["lines"].values():
+        line["envelope"] = None  # of other meshes as well, and of files of 0.6
+        line |= {x: np.full_like(line[x], np.nan) for x in REFERENCES if x in line}
+        line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
+        line["before"]["report"] = line["report"]
+        if "self_contact" in line:
+            line["self_contact"] = None  # as many places of friction as there are
+    found = matched(saved, template)
+    if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
+        raise ValueError(f"leg: a time up to {found['t']:g} s was expected")
+    run.start_from(found["rest"])
+    run.make_solver()
+    set_state(run, found)
+    if any("report" not in of_line(given, line.name) for line in run.lines):  # nor in one of 0.6, of a cable
+        run.evaluate_forces("where the checkpoint is")
+        for line in run.lines:  # whose envelope is of the steps to come
+            line.books.extremes[:] = no_extremes(line.books.extremes.shape[2])
+    for line in run.lines:
+        if "imposed" not in of_line(given, line.name).get("before", ()):  # not in files of an earlier program
+            line.impose_now()
+
+
+def _of_today(run: RecordedRun, saved: Mapping[str, Any]) -> dict[str, Any]:
+    """A checkpoint with what files of an earlier program, or of a cable, do not have.
+
+    It took the added mass of members as at the first guess.
+    """
+    older: dict[str, Any] = {"rest": run.rest, "control": [], "cuts": run.loop.cuts(), "interval": 0.0}
+    older |= {"rho": run.network.require_time().rho_inf, "worked": run.loop.worked[1, :, :SPRING]}
+    older |= {"bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING], **WITHOUT}
+    found = older | dict(saved)
+    for part in run.parts:
+        found |= part.of_today(saved)
+    return found
+
+
+def lines_of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
+    """Lines of a checkpoint with what earlier programs did not have.
+
+    Mean tensions, the end of a report, answers to torques, what diagnostics remember, and a spectral radius of their
+    own; rho: that of all lines.
+    """
+    if not (isinstance(lines, dict) and all(isinstance(x, dict) for x in lines.values())):
+        return lines
+    found = {}
+    for name, saved in lines.items():
+        line = {key: x for key, x in saved.items() if key != "correction"}  # of what leaving bending out did, in 1.0
+        mine, state, report = template.get(name), line.get("state"), line.get("report")
+        if mine is not None and isinstance(state, dict):
+            empty = {x: mine["state"][x] for x in OPTIONAL_STATE if x in mine["state"] and not mine["state"][x].size}
+            line = line | {"state": {**empty, **state}}
+        work = line.get("work")
+        if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < WORKS:
+            line = line | {"work": np.pad(work, (0, WORKS - work.size))}
+        if isinstance(report, np.ndarray) and report.ndim == 1 and FIRST_REPORT <= report.size < REPORT_SIZE:
+            line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
+        if mine is not None and "torsion" in mine:
+            line = {"torsion": mine["torsion"]} | line
+        if mine is not None:
+            before = line.get("before", {})
+            older = {"rho": rho, "report": mine["report"]} | {x: mine[x] for x in REFERENCES if x in mine}
+            line = older | line | {"before": mine["before"] | before if isinstance(before, dict) else before}
+        if mine is not None and isinstance(line.get("noted"), dict):
+            line = line | {"noted": mine["noted"] | line["noted"]}
+        found[name] = line
+    return found
+
+
+def set_state(run: RecordedRun, found: Mapping[str, Any]) -> None:
+    """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
+    run.stand_at(found["t"], found["steps"], found["last"], found["rho"], found["interval"])
+    run.loaded, run.leg, run.cpu = found["loaded"], (found["leg"][0], found["leg"][1]), found["cpu"]
+    longest = max(max(x.step, x.later) for x in run.resolution.lines.values())
+    run.loop.restore_control(found["control"], longest)
+    run.loop.restore_cuts(found["cuts"])
+    run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
+    run.loop.worked[0], run.loop.worked[1, :, :SPRING] = run.solver.body_work, found["worked"]
+    for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):
+        mine = found["lines"][line.name]
+        for name, values in mine["state"].items():
+            getattr(state, name)[:] = values
+        line.books.clock.last_rho = mine["rho"]
+        line.restore(mine, work, run.t, x.joints)
+    for part in run.parts:
+        part.restore(found)
+
+
+def content(run: RecordedRun) -> dict[str, Any]:
+    """What the writer keeps of a checkpoint."""
+    resolution = {name: resolution_tree(x) for name, x in run.resolution.lines.items()}
+    asks = run.criterion is not None
+    return {"program": program(), "asks": asks, "resolution": resolution, "state": checkpoint(run)}
+
+
+def kept_changes(source: Path, most: int) -> int:
+    """How many changes of loads were made up to the checkpoint of a result; ResultError: more than `most`."""
+    with opened(source) as file, refused(source):
+        state = read_checkpoint(file).state
+        made = int(state.get("changes", 0)) if isinstance(state, Mapping) else 0  # not in files of an earlier program
+        if not 0 <= made <= most:
+            raise ValueError(f"changes: up to {most} were expected")
+        return made

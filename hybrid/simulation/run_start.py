@@ -30,8 +30,7 @@ from hybrid.scene.motion_tables import Motion, Triple
 from hybrid.scene.network import Network
 from hybrid.scene.points import FixedPoint
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.events import EventLog
-from hybrid.simulation.failure import slack_remedy
+from hybrid.simulation.events import EventLog, slack_remedy
 from hybrid.simulation.lines_contact import JUMP, crossed, diameters, jumps, least_bending, shared_of, watched_pairs
 from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.contact_statics import settled_system, touching_solver
@@ -76,7 +75,7 @@ def with_contact(
     if not any(_touch(group.lines)):
         return model, found
     first_shapes = _before_current(model)
-    lost = _has_lost(group.lines, first_shapes, found)
+    lost = bool(keeps_turns(group.lines, first_shapes, OF_SHAPE)(found.state)[1])
     lost = lost or _passes_another(model, group, first_shapes, found.state)
     each = zip(_touch(group.lines), model.models, found.state.lines, strict=True)
     lost = lost or any(touches and passes_itself(x, state) for touches, x, state in each)
@@ -112,14 +111,6 @@ def passes_itself(model: Model, state: State) -> bool:
 def contact_of(model: Model) -> SelfContact:
     """Contact without friction of the line of a model with itself."""
     return SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale)
-
-
-def nearness(model: Model, t: float, state: State) -> Floats:
-    """How near nodes (N+1,) of a line at rest are to other parts of it: above 1, nearer than two diameters."""
-    contact = contact_of(model)
-    near = contact.watch_nearness(1.0)
-    contact.energy_of(model.line, model.ends.at_time(t), state)
-    return near
 
 
 def _passes_another(model: NetworkModel, group: Group, first: NetworkState, found: NetworkState) -> bool:
@@ -189,19 +180,14 @@ def touches_alone(model: NetworkModel, number: int) -> bool:
     return bool(model.models[number].line.bits & SELF_CONTACT) and number not in others
 
 
-def energy_of(x: JoinedLine, model: Model, state: State) -> float:
-    """Energy, J, of contact of a line at rest; infinite: parts are in each other."""
-    return contact_of(model).energy_of(x.line, x.ends, state)
-
-
 def _touch(lines: Iterable[JoinedLine]) -> list[bool]:
     return [bool(x.line.bits & SELF_CONTACT) for x in lines]
 
 
 def _largest_energy(model: NetworkModel, group: Group, state: NetworkState) -> float:
-    """Of all lines that contact is asked for, J."""
+    """Largest energy, J, of contact of lines that it is asked for; infinite: parts are in each other."""
     each = enumerate(zip(group.lines, model.models, state.lines, strict=True))
-    found = [energy_of(*x) for k, x in each if touches_alone(model, k)]
+    found = [contact_of(m).energy_of(x.line, x.ends, one) for k, (x, m, one) in each if touches_alone(model, k)]
     if model.touching is not None:
         found.append(energy_between(model, group.lines, group.bodies, state)[0])
     return max(found)
@@ -221,8 +207,12 @@ def nearness_in(model: NetworkModel, lines: Sequence[JoinedLine], found: LinesAt
 
     Lines that touch neither themselves nor others are not in it.
     """
-    each = enumerate(zip(model.models, found.state.lines, strict=True))
-    near = {k: nearness(x, t, state) for k, (x, state) in each if touches_alone(model, k)}
+    near = dict[int, Floats]()
+    for k, (x, state) in enumerate(zip(model.models, found.state.lines, strict=True)):
+        if touches_alone(model, k):
+            contact = contact_of(x)
+            near[k] = contact.watch_nearness(1.0)
+            contact.energy_of(x.line, x.ends.at_time(t), state)
     if model.touching is not None:
         bodies = found.bodies
         solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
@@ -237,16 +227,15 @@ def _first_apart(model: NetworkModel, group: Group, starts: Iterable[Start]) -> 
     return next((state for _, state in starts if math.isfinite(_largest_energy(model, group, state))), None)
 
 
-def _has_lost(lines: Sequence[JoinedLine], hung: NetworkState, found: LinesAtRest) -> bool:
-    """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
-    return bool(keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
-
-
 def keeps_turns(
     lines: Sequence[JoinedLine], start: NetworkState, within: float
 ) -> Callable[[NetworkState], tuple[int, str]]:
-    """What tells of the first line whose link in a state is not that of the start."""
-    asked = {k: _link(x, start.lines[k]) for k, x in enumerate(lines) if _holds_turns(x)}
+    """What tells of the first line whose link in a state is not that of the start.
+
+    Of those whose turns cannot change: contact is asked for, and what holds their twist does not turn.
+    """
+    holds = [bool(x.line.bits & SELF_CONTACT) and holds_twist(x.line) and not x.seats[:, TURNS].any() for x in lines]
+    asked = {k: _link(x, start.lines[k]) for k, x in enumerate(lines) if holds[k]}
 
     def lost(states: NetworkState) -> tuple[int, str]:
         for k, link in asked.items():
@@ -257,11 +246,6 @@ def keeps_turns(
         return -1, ""
 
     return lost
-
-
-def _holds_turns(x: JoinedLine) -> bool:
-    """Whether the turns of a line cannot change: contact is asked for, and what holds its twist does not turn."""
-    return bool(x.line.bits & SELF_CONTACT) and holds_twist(x.line) and not x.seats[:, TURNS].any()
 
 
 def _link(x: JoinedLine, state: State) -> float:
@@ -373,9 +357,7 @@ def note_drawn(scene: LineScene, events: EventLog) -> None:
         events.event(0.0, 0.0, cable.length, "implausible", text)
 
 
-def rotate_ends_in(
-    scene: LineScene, model: Model, state: State, events: EventLog, held: tuple[bool, bool] = (True, True)
-) -> None:
+def rotate_ends_in(scene: LineScene, model: Model, state: State, events: EventLog, held: tuple[bool, bool]) -> None:
     """Tangents that the initial shape does not have are reached smoothly, and an event says so.
 
     held: whether the start and the end are held, and not on what moves by the lines.

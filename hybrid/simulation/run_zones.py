@@ -37,11 +37,11 @@ from hybrid.model.build import Model
 from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.cell_changes import CellChanges, carries_all
-from hybrid.simulation.envelope import marks_on
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.parts import Part
 from hybrid.simulation.remesh import Around
 from hybrid.simulation.restart import zoning_of_today
+from hybrid.simulation.result_file import marks_on
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps, Tried

@@ -6,14 +6,15 @@ memory for steps that are computed several times over.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from math import isfinite
 from time import monotonic
-from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
+from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
+from hybrid.errors import ComputationError
 from hybrid.kernels.state.report import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
 from hybrid.kernels.state.state import Floats, State, obstacles_now
 from hybrid.model.ends import STILL, DrivenEnd, rotation_vector
@@ -22,8 +23,8 @@ from hybrid.model.network import NetworkModel
 from hybrid.model.sea import Surroundings
 from hybrid.scene.network import SomeScene
 from hybrid.simulation.run import Run
-from hybrid.simulation.run_checkpoint import checkpoint, set_state
-from hybrid.solve.stepper import NetworkState
+from hybrid.simulation.run_record import checkpoint, set_state
+from hybrid.solve.stepper import LineFailed, NetworkState
 from hybrid.store.recorder import Mark, Rows
 from hybrid.store.writer import Recorder
 
@@ -48,23 +49,16 @@ class EndForces(NamedTuple):
     moment_end: Floats
 
 
-class Locked(Protocol):
-    """What has a lock of its own."""
-
-    lock: Any
-
-
 Triple = tuple[float, float, float]
 P = ParamSpec("P")
 R = TypeVar("R")
-L = TypeVar("L", bound=Locked)
 
 
-def one_thread(method: Callable[Concatenate[L, P], R]) -> Callable[Concatenate[L, P], R]:
+def one_thread(method: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
     """A method that refuses with ValueError while another thread is in one of its object's methods."""
 
     @wraps(method)
-    def alone(self: L, *args: P.args, **options: P.kwargs) -> R:
+    def alone(self: Any, *args: P.args, **options: P.kwargs) -> R:
         if not self.lock.acquire(False):
             raise ValueError("another thread is using this Simulation: one at a time, or a Simulation for each")
         try:
@@ -113,6 +107,15 @@ def numbers(x: Any, name: str) -> Floats:
         raise ValueError(f"{name}: expected numbers, found {x!r:.60}") from None
 
 
+def rotation_asked(matrix: Any, name: str) -> Floats:
+    """A rotation matrix (3, 3) that is set from outside.  ValueError: it is none."""
+    wanted = numbers(matrix, name)
+    proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
+    if not (proper and np.linalg.det(wanted) > 0.0):
+        raise ValueError(f"{name}: expected a rotation matrix (3, 3), right-handed")
+    return wanted
+
+
 def in_space(scene: SomeScene) -> SomeScene:
     return scene if scene.dimension is not None else scene.model_copy(update={"dimension": 3})
 
@@ -133,6 +136,15 @@ ONE_STEP = 1.5
 Course = tuple[Triple, Triple | None, Triple]  # where an obstacle is to be, how fast, and how far it turns on the way
 
 
+def set_out(ends: Sequence[DrivenEnd], course: Course | None, now: float, until: float, one_step: bool) -> None:
+    """What is set is on its way from `now` to `until` (s), None: it stays; one_step: whether in one step."""
+    for end in ends:
+        if course is None:
+            end.stay(now, until, one_step)
+        else:
+            end.set(now, until, *course, one_step)
+
+
 class ObstacleState(NamedTuple):
     """Place (3,) m of an obstacle, its rotation (3, 3) since t = 0, and the load of all lines.
 
@@ -150,20 +162,30 @@ class SettableObstacles:
 
     lock: Any
     scene: Any
+    _run: Run
+    _closed = False
+    _failed: tuple[LineFailed, ComputationError] | None = None  # of the last step, until `restore`
     _courses: dict[str, Course]  # of those that are set for the next step
     _moved: dict[str, None]  # those that have been set at all, in order
 
     @property
     def t(self) -> float:
         """Time of the state, s."""
-        raise NotImplementedError
+        return self._run.t
 
     def _check_open(self) -> None:
-        raise NotImplementedError
+        if self._closed:
+            raise ValueError("the simulation is over: its result has been written")
+
+    def _check_sound(self) -> None:
+        """Of what belongs to the last step: after one that failed there is none until `restore`."""
+        if self._failed is not None:
+            reason = str(self._failed[1]).splitlines()[0]
+            raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
 
     def _states(self) -> list[tuple[Surroundings, State]]:
         """The sea around each line, and the state of that."""
-        raise NotImplementedError
+        return [(x.sea, state) for x, state in zip(self._run.model.models, self._run.state.lines, strict=True)]
 
     @one_thread
     def set_obstacle(
@@ -181,11 +203,7 @@ class SettableObstacles:
         there = triple(now[0] if position is None else position, "position")
         speed, turn = None if velocity is None else triple(velocity, "velocity"), STILL
         if rotation is not None:
-            wanted = numbers(rotation, "rotation")
-            proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
-            if not (proper and np.linalg.det(wanted) > 0.0):
-                raise ValueError("rotation: expected a rotation matrix (3, 3), right-handed")
-            turn = triple(rotation_vector(now[2].T @ wanted), "rotation")
+            turn = triple(rotation_vector(now[2].T @ rotation_asked(rotation, "rotation")), "rotation")
         self._courses[name], self._moved[name] = (there, speed, turn), None
 
     @one_thread
@@ -216,31 +234,7 @@ class SettableObstacles:
     def _move_obstacles(self, now: float, until: float, one_step: bool) -> None:
         """Those that have been set are on their way from `now` to `until` (s); one_step: whether in one step."""
         for name in self._moved:
-            ends = self._obstacle_paths(name)
-            course = self._courses.pop(name, None)
-            for end in ends:
-                if course is None:
-                    end.stay(now, until, one_step)
-                else:
-                    end.set(now, until, *course, one_step)
-
-    def _kept_courses(self) -> tuple[dict[str, Floats], dict[str, None], dict[str, Course]]:
-        """What is set of obstacles, in copies."""
-        paths = {name: ends[0].keep() for name, ends in self._all_driven()}
-        return paths, dict(self._moved), dict(self._courses)
-
-    def _bring_back_courses(self, kept: tuple[Mapping[str, Floats], Mapping[str, None], Mapping[str, Course]]) -> None:
-        """Be set as when `_kept_courses` was called."""
-        paths, moved, courses = kept
-        self._moved, self._courses = dict(moved), dict(courses)
-        for name, path in paths.items():
-            for end in self._obstacle_paths(name):
-                end.bring_back(path)
-
-    def _all_driven(self) -> Iterator[tuple[str, list[DrivenEnd]]]:
-        for name, x in self.scene.obstacles.items():
-            if x.from_outside:
-                yield name, self._obstacle_paths(name)
+            set_out(self._obstacle_paths(name), self._courses.pop(name, None), now, until, one_step)
 
 
 def _one_of(names: Any) -> str:
@@ -260,15 +254,12 @@ class Saved(NamedTuple):
     model: NetworkModel  # with what had broken by then
     waiting: tuple[Any, ...]  # rows of each line that are not recorded yet
     marks: tuple[Mark, ...]  # of the recorders
-    stops: tuple[float, ...]  # s, that are still to come
     before: NetworkState  # the state before the last step
     stood: tuple[tuple[Floats, Floats], ...]  # positions (2, 3) m and frames (2, 9) of the ends of each line
     loads: tuple[Any, ...]  # of these ends
-    driven: Mapping[str, list[DrivenEnd]]  # what moves points that are set from outside, for each end there
-    paths: Mapping[str, list[Floats]]  # on which they are
-    next: Mapping[str, Course]  # where points are to be at the end of the next step
-    obstacles: Any  # what is set of them
-    wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
+    asked: Mapping[str, Any]  # what was set from outside, and the stops to come: as of `stepping.ASKED`
+    paths: Mapping[str, list[Floats]]  # on which points that are set from outside are, for each end there
+    obstacles: Mapping[str, Floats]  # the same of obstacles
 
 
 def recorders(run: Run) -> list[Rows]:

@@ -6,7 +6,7 @@ A scene in the short form (`cable`, `ends`) is a network of one line whose point
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
@@ -21,22 +21,20 @@ from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B, PL
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.step_control import before_fixed, weights
 from hybrid.model.build import Model
-from hybrid.model.ends import STILL, DrivenEnd, EndConditions, rotation_vector
+from hybrid.model.ends import STILL, DrivenEnd, EndConditions, contradictions, rotation_vector
 from hybrid.model.failure import Weakness
 from hybrid.model.network import NetworkModel
-from hybrid.model.sea import Surroundings
 from hybrid.scene.base import dotted
 from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
 from hybrid.scene.root import ENDS, ShortForm
-from hybrid.simulation.run import Run
 from hybrid.simulation.stepped import (
     CableState,
     Course,
     EndForces,
     SettableObstacles,
-    numbers,
     one_thread,
+    rotation_asked,
     triple,
     vector,
 )
@@ -75,7 +73,6 @@ class SteppedPoints(SettableObstacles):
 
     _system: Network  # what is computed
     _form: ShortForm  # what points and lines are called in the scene
-    _run: Run
     _driven: dict[str, list[DrivenEnd]]  # of points that are set, for each end there
     _next: dict[str, Course]  # where points are to be at the end of the next step
     _wound: dict[int, tuple[float | None, float]]  # length and rate that are asked of lines
@@ -85,18 +82,6 @@ class SteppedPoints(SettableObstacles):
     _report: Floats | None = None  # of the last step, of which the next are
     _reported: Floats  # (4, 3) forces and moments at both ends in it
     _signs: Floats  # (4, 3) what of the report of a step is a force or a moment on what holds an end, with its sign
-
-    @property
-    def t(self) -> float:
-        """Time of the state, s."""
-        return self._run.t
-
-    def _states(self) -> list[tuple[Surroundings, State]]:
-        return [(x.sea, state) for x, state in zip(self._run.model.models, self._run.state.lines, strict=True)]
-
-    def _check_sound(self) -> None:
-        """ValueError: the last step has failed."""
-        raise NotImplementedError
 
     # --- points that are held -----------------------------------------------------------------------
 
@@ -129,7 +114,7 @@ class SteppedPoints(SettableObstacles):
         if self.scene.dimension == 2:
             self._check_plane(name, "position", np.array(there) - where.at_time(self.t)[0])
         if frame is not None:
-            turn = triple(rotation_vector(where.at_time(self.t)[2].T @ rotation_asked(frame)), "frame")
+            turn = triple(rotation_vector(where.at_time(self.t)[2].T @ rotation_asked(frame, "frame")), "frame")
         self._next[name] = there, speed, turn
 
     def set_end(
@@ -160,8 +145,27 @@ class SteppedPoints(SettableObstacles):
         self._forget_released()
 
     def _fail(self, failed: LineFailed) -> ComputationError:
-        """What the failure of a step becomes."""
-        raise NotImplementedError
+        """What the failure of a step becomes, after which `restore` leads on."""
+        error = self._error_of(failed)
+        self._failed = failed, error
+        return error
+
+    def _error_of(self, failed: LineFailed) -> ComputationError:
+        """An error in the words of the scene, with a snapshot; velocities that contradict their places are told."""
+        if failed.outcome == Outcome.GAINS_ENERGY and (text := contradictions(self._set_from_outside(), soon=True)):
+            failed = LineFailed(failed.line, failed.outcome, failed.t, failed.s, failed.detail, first=text)
+        return self._run.error_of(failed)
+
+    def _ends_set(self) -> Iterator[DrivenEnd]:
+        """What is set from outside."""
+        for ends in self._driven.values():
+            yield from ends[:1]
+        for name in self._moved:
+            yield self._obstacle_paths(name)[0]
+
+    def _set_from_outside(self) -> dict[str, DrivenEnd]:
+        names = [self._key_of(name) for name, ends in self._driven.items() if ends]
+        return dict(zip([*names, *(f"obstacles.{name}" for name in self._moved)], self._ends_set(), strict=True))
 
     def _forget_released(self) -> None:
         """Points that are free now are no longer set."""
@@ -441,15 +445,6 @@ class SteppedPoints(SettableObstacles):
         if not isinstance(name, str) or name not in names:
             raise ValueError(f"name: expected a line of the scene ({', '.join(names)}), found {name!r:.60}")
         return names.index(name)
-
-
-def rotation_asked(matrix: Any, name: str = "frame") -> Floats:
-    """A rotation matrix (3, 3) that is set from outside.  ValueError: it is none."""
-    wanted = numbers(matrix, name)
-    proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
-    if not (proper and np.linalg.det(wanted) > 0.0):
-        raise ValueError(f"{name}: expected a rotation matrix (3, 3), right-handed")
-    return wanted
 
 
 # How the force on an end of one cable changes with the place it is set to: the factors of the last step.

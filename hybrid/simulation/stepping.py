@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
+from copy import copy
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -13,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ComputationError, Outcome, SceneError
-from hybrid.kernels.state.state import Floats
+from hybrid.errors import ComputationError, SceneError
 from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.analysis import missing_time
@@ -22,10 +22,9 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, layered, rods_at_rest, with_survey
-from hybrid.simulation.new_run import Recording, new_run, static_system
 from hybrid.simulation.own_parts import RunPart, checked_parts
-from hybrid.simulation.run import Run
-from hybrid.simulation.run_record import Asked
+from hybrid.simulation.run import Run, new_run, static_system
+from hybrid.simulation.run_record import Asked, Recording
 from hybrid.simulation.stepped import (
     ONE_STEP,
     SLIVER,
@@ -39,6 +38,7 @@ from hybrid.simulation.stepped import (
     kept,
     marks_of,
     one_thread,
+    set_out,
 )
 from hybrid.simulation.stepped_points import SteppedPoints
 from hybrid.solve.network_steps import ROWS_OUTSIDE
@@ -51,6 +51,8 @@ from hybrid.zones.criteria import UserCriterion
 
 # s of the wall, after which the time of the processor is read again: to read it may take as long as ten steps.
 READ_OUTSIDE = 1.0
+# What a Simulation has been asked for, and is given back where it is taken back.
+ASKED = ("_stops", "_driven", "_next", "_wound", "_moved", "_courses")
 NUMBER = (int, float, np.integer, np.floating)
 
 
@@ -99,8 +101,6 @@ class Simulation(SteppedPoints):
             self._target = Path(output).expanduser().resolve()
             check_target(self._target, overwrite)
             self._stack.enter_context(locked(self._target))
-        self._closed = False
-        self._failed: tuple[LineFailed, ComputationError] | None = None  # of the last step, until `restore`
         try:
             self._run = self._begun(most, criterion, parts)
         except BaseException:
@@ -204,12 +204,7 @@ class Simulation(SteppedPoints):
             paying.advance(now, until, self._wound.pop(k, None))
         one_step = until - now <= ONE_STEP * (self._fixed_step or self._run.last_step)
         for name, ends in self._driven.items():
-            course = self._next.pop(name, None)
-            for end in ends:
-                if course is None:
-                    end.stay(now, until, one_step)
-                else:
-                    end.set(now, until, *course, one_step)
+            set_out(ends, self._next.pop(name, None), now, until, one_step)
         if self._moved:
             self._move_obstacles(now, until, one_step)
 
@@ -222,23 +217,6 @@ class Simulation(SteppedPoints):
             self._run.go_to(until)
         else:
             self._run.step_to(until)
-
-    def _check_sound(self) -> None:
-        """Of what belongs to the last step: after one that failed there is none until `restore`."""
-        if self._failed is not None:
-            reason = str(self._failed[1]).splitlines()[0]
-            raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
-
-    def _ends_set(self) -> Iterator[DrivenEnd]:
-        """What is set from outside."""
-        for ends in self._driven.values():
-            yield from ends[:1]
-        for name in self._moved:
-            yield self._obstacle_paths(name)[0]
-
-    def _set_from_outside(self) -> dict[str, DrivenEnd]:
-        names = [self._key_of(name) for name, ends in self._driven.items() if ends]
-        return dict(zip([*names, *(f"obstacles.{name}" for name in self._moved)], self._ends_set(), strict=True))
 
     # --- back and forth ---------------------------------------------------------------------------
 
@@ -278,17 +256,10 @@ class Simulation(SteppedPoints):
 
     def _kept(self) -> Saved:
         paths = {name: [end.keep() for end in ends] for name, ends in self._driven.items()}
-        return Saved(
-            self._owner,
-            self._final,
-            stops=tuple(self._stops),
-            driven=dict(self._driven),
-            paths=paths,
-            next=dict(self._next),
-            wound=dict(self._wound),
-            obstacles=self._kept_courses(),
-            **kept(self._run),
-        )
+        of_outside = [name for name, x in self.scene.obstacles.items() if x.from_outside]
+        obstacles = {name: self._obstacle_paths(name)[0].keep() for name in of_outside}
+        asked = {name: copy(getattr(self, name)) for name in ASKED}
+        return Saved(self._owner, self._final, asked=asked, paths=paths, obstacles=obstacles, **kept(self._run))
 
     def _bring_back(self, saved: Saved) -> None:
         for name in self._places.keys() - saved.paths.keys():  # what has been set since, for the first time
@@ -297,36 +268,24 @@ class Simulation(SteppedPoints):
                 if isinstance(end, DrivenEnd):
                     position, frame = saved.stood[line]
                     end.stand(position[k], frame[k])
-        self._driven, self._driven_of = dict(saved.driven), None
-        self._set_paths(saved.paths)
-        self._bring_back_courses(saved.obstacles)
+        vars(self).update({name: copy(x) for name, x in saved.asked.items()})
+        self._driven_of = self._failed = None
+        self._set_paths(saved)
         bring_back(self._run, saved)
-        self._bring_back_courses(saved.obstacles)  # of the model of then
-        self._set_paths(saved.paths)  # with the frames of then
+        self._set_paths(saved)  # of the model, and with the frames, of then
         for model in self._run.model.models:
             model.ends.at_time(self.t)
-        self._stops, self._next = [*saved.stops], dict(saved.next)
-        self._wound, self._failed = dict(saved.wound), None
 
-    def _set_paths(self, paths: Mapping[str, list[Floats]]) -> None:
-        """Let points that are set from outside be on these paths."""
-        for name, rows in paths.items():
+    def _set_paths(self, saved: Saved) -> None:
+        """Let points and obstacles that are set from outside be on their paths of then."""
+        for name, rows in saved.paths.items():
             for end, path in zip(self._driven[name], rows, strict=True):
+                end.bring_back(path)
+        for name, path in saved.obstacles.items():
+            for end in self._obstacle_paths(name):
                 end.bring_back(path)
 
     # --- the end ----------------------------------------------------------------------------------
-
-    def _fail(self, failed: LineFailed) -> ComputationError:
-        """What the failure of a step becomes, after which `restore` leads on."""
-        error = self._error_of(failed)
-        self._failed = failed, error
-        return error
-
-    def _error_of(self, failed: LineFailed) -> ComputationError:
-        """An error in the words of the scene, with a snapshot; velocities that contradict their places are told."""
-        if failed.outcome == Outcome.GAINS_ENERGY and (text := contradictions(self._set_from_outside(), soon=True)):
-            failed = LineFailed(failed.line, failed.outcome, failed.t, failed.s, failed.detail, first=text)
-        return self._run.error_of(failed)
 
     def _end_with(self, failed: LineFailed) -> ComputationError:
         """Close the file of what has failed."""
@@ -362,10 +321,6 @@ class Simulation(SteppedPoints):
                 self._run.finish(status, message)
             except LineFailed as late:  # an output says that going on makes no sense
                 raise self._end_with(late) from None
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise ValueError("the simulation is over: its result has been written")
 
     def __enter__(self) -> Simulation:
         return self

@@ -6,6 +6,7 @@ Drag and slack may set it off again in every period of the motion: it has died o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -40,27 +41,23 @@ class VibrationSteps:
         self._rows = np.zeros((0, 3))  # of steps since the last look: s; N, at start and end
         self._counts_from = 0.0  # s, from when on little has been seen
 
-    def begin(self, clock: Clock) -> None:
-        """Steps are short from here on if a vibration begins here; clock: of kernels.state.books."""
-        now = float(clock.now)
+    def begin(self, now: float) -> None:
+        """Steps are short from now (s) on if a vibration begins here."""
         if any(abs(now - t) <= 1e-9 * self._period for t in self.begins):
             self.look, self._rows = now + SEEN * self._period, self._rows[:0]
             self._counts_from = max(now, self._recurs[0])
-        if self.begins:
-            self._bound(clock)
 
     def log(self, rows: Floats) -> None:
         """Remember the forces (n, 3) at the ends in steps: s; N, at start and end."""
         if self.look < np.inf:
             self._rows = np.vstack([self._rows, rows])
 
-    def judge(self, clock: Clock) -> None:
+    def judge(self) -> None:
         """At `look`: longer steps, if a whole period of the motion has shown little of the vibration."""
         if not self.amplitude() <= GONE * self._still:
             self._counts_from = max(self.look, self._recurs[0])
         gone = self.look - self._counts_from >= max(self._recurs[1], SEEN * self._period)
         self.look, self._rows = np.inf if gone else self.look + SEEN * self._period, self._rows[:0]
-        self._bound(clock)
 
     def amplitude(self) -> float:
         """Of the larger vibration of the forces at both ends, N, since the last look; infinity: not known."""
@@ -80,23 +77,19 @@ class VibrationSteps:
             return np.inf
         return self._short if self.look < np.inf else self._long
 
-    def _bound(self, clock: Clock) -> None:
-        clock.largest = self.largest
-        clock.next_dt = min(clock.next_dt, clock.largest)
-
     def checkpoint(self) -> dict[str, Any]:
         """What later steps depend on; look: -1 for none."""
         look = self.look if self.look < np.inf else -1.0
         return {"look": float(look), "from": float(self._counts_from), "rows": self._rows}
 
-    def restore(self, saved: Mapping[str, Any] | None, clock: Clock) -> None:
-        """Continue as `checkpoint` has said; None: of a file from before, a vibration may last from here on.
+    def restore(self, saved: Mapping[str, Any] | None, now: float) -> None:
+        """Continue as `checkpoint` has said; None: of a file from before, a vibration may last from now (s) on.
 
         ValueError: that cannot be.
         """
         if not self.begins:
             return
-        now, span = float(clock.now), SEEN * self._period
+        span = SEEN * self._period
         if saved is None:
             self._counts_from = max(now, self._recurs[0])
             self.look = now + span if now > self.begins[0] else np.inf
@@ -107,23 +100,21 @@ class VibrationSteps:
             due = self.look == np.inf or now - 1e-9 * span <= self.look <= now + (1.0 + 1e-9) * span
             if not due or self._rows.ndim != 2 or self._rows.shape[1] != 3:
                 raise ValueError("a vibration that no run shows")
-        self._bound(clock)
 
 
 class VibrationsOfLines(Part):
     """The same of several lines, by name, whose steps are those of the line that asks for the shortest."""
 
-    name = "vibrations"
+    name, older = "vibrations", MappingProxyType({"vibrations": {}})
 
     def __init__(self, lines: Mapping[str, VibrationSteps], clock: Clock) -> None:
         """clock: of the run."""
         self._lines, self._clock = lines, clock
-        self._begins = sorted({t for x in lines.values() for t in x.begins})
 
     @property
     def begins(self) -> list[float]:
         """When vibrations begin, s."""
-        return self._begins
+        return sorted({t for x in self._lines.values() for t in x.begins})
 
     @property
     def due(self) -> float:
@@ -133,7 +124,7 @@ class VibrationsOfLines(Part):
     def at_stop(self) -> None:
         """Steps are short from here on if a vibration begins here."""
         for x in self._lines.values():
-            x.begin(self._clock)
+            x.begin(float(self._clock.now))
         self._bound()
 
     def log(self, rows: Floats, cpu: Floats) -> None:
@@ -146,11 +137,11 @@ class VibrationsOfLines(Part):
         now = self.due
         for x in self._lines.values():
             if x.look == now:
-                x.judge(self._clock)
+                x.judge()
         self._bound()
 
     def _bound(self) -> None:
-        if self._begins:
+        if self.begins:
             self._clock.largest = min(x.largest for x in self._lines.values())
             self._clock.next_dt = min(self._clock.next_dt, self._clock.largest)
 
@@ -158,12 +149,8 @@ class VibrationsOfLines(Part):
         """What later steps depend on, by line."""
         return {"vibrations": {name: x.checkpoint() for name, x in self._lines.items() if x.begins}}
 
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """In files of an earlier program there were none."""
-        return {"vibrations": saved.get("vibrations", {})}
-
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said, as of `VibrationSteps`."""
         for name, x in self._lines.items():
-            x.restore(saved["vibrations"].get(name), self._clock)
+            x.restore(saved["vibrations"].get(name), float(self._clock.now))
         self._bound()

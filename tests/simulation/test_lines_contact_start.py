@@ -13,7 +13,7 @@ import pytest
 import hybrid
 from hybrid.kernels.state.books import PARTS_ITSELF
 from hybrid.model.network import build_system
-from hybrid.simulation import run_checkpoint
+from hybrid.simulation import run_record
 from tests.scenes import line_between, network_scene
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, crossing, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
@@ -287,7 +287,7 @@ def test_other_loads_change_nothing_of_what_touches(begun: Any, tmp_path: Path) 
 
 def write_as_before(patch: pytest.MonkeyPatch) -> None:
     """Let runs be those of a version that computed no contact between lines without being asked."""
-    content = run_checkpoint.content
+    content = run_record.content
 
     def as_before(run: Any) -> dict[str, Any]:
         kept = content(run)
@@ -295,7 +295,7 @@ def write_as_before(patch: pytest.MonkeyPatch) -> None:
         return kept
 
     patch.setattr("hybrid.model.network.that_may_meet", lambda *_: ())
-    patch.setattr("hybrid.simulation.run.content", as_before)
+    patch.setattr("hybrid.simulation.run_record.content", as_before)
 
 
 @pytest.mark.long  # 1.0 s

@@ -13,7 +13,8 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.state.books import ASK_STEPS
 from hybrid.scene.root import in_full
-from hybrid.simulation.new_run import Recording, new_run
+from hybrid.simulation.run import new_run
+from hybrid.simulation.run_record import Recording
 from hybrid.store.format import MemoryTarget
 from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 

@@ -16,7 +16,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.build import WHAT, build
 from hybrid.scene.read import one_line
-from hybrid.simulation.lone_planes import PlaneMonitor
+from hybrid.simulation.lone_planes import LonePlane
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -387,7 +387,7 @@ def storm(duration: float) -> hybrid.Scene:
 def test_a_line_that_has_buckled_comes_back_to_its_plane(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the plane its forces are those in space, and what was left across it leads to the same next buckle."""
     flat = hybrid.run(storm(333.0))
-    monkeypatch.setattr(PlaneMonitor, "attach", _never_back(PlaneMonitor.attach))
+    monkeypatch.setattr(LonePlane, "attach", _never_back(LonePlane.attach))
     space = hybrid.run(storm(333.0))
     assert [e.kind for e in flat.events].count("out of plane") == 1
     t, across, there = flat.t, *(np.abs(x.position[:, :, 1]).max(axis=1) for x in (flat, space))
@@ -401,8 +401,8 @@ def test_a_line_that_has_buckled_comes_back_to_its_plane(monkeypatch: pytest.Mon
 
 
 def _never_back(attach):
-    def without(self, run, line):
+    def without(self, solver):
         self.comes_back = False
-        attach(self, run, line)
+        attach(self, solver)
 
     return without

@@ -18,8 +18,7 @@ from hybrid.model.build import build
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
 from hybrid.simulation.diagnostics import Diagnostics
-from hybrid.simulation.events import EventLog
-from hybrid.simulation.failure import kinks_at
+from hybrid.simulation.events import EventLog, kinks_at
 from hybrid.store.verdicts import MET, verdicts_of
 from tests.scenes import cable_scene, pinned_at
 

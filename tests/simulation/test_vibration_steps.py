@@ -22,7 +22,7 @@ from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene, one_line
 from hybrid.scene.root import LINE
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.vibration_steps import VibrationSteps
+from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.simulation.watches import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
 from tests.said import ONE, both_ways, line_of, said
 from tests.scenes import cable_scene, pinned_at
@@ -49,7 +49,7 @@ def watched(scene=None):
     resolution, clock = first_resolution(scene), b.Clock()
     clock.largest = clock.next_dt = resolution.step
     steps = VibrationSteps(scene, resolution)
-    steps.begin(clock)
+    VibrationsOfLines({"line": steps}, clock).at_stop()
     return resolution, clock, steps
 
 
@@ -60,7 +60,7 @@ def look(steps, clock, amplitude):
     steps.log(np.column_stack([t, np.full_like(t, 50.0), force]))
     found = steps.amplitude()
     clock.now = steps.look
-    steps.judge(clock)
+    VibrationsOfLines({"line": steps}, clock).at_due()
     return found
 
 
@@ -78,7 +78,7 @@ def test_steps_are_short_until_a_period_of_the_motion_has_shown_little():
     assert clock.largest == resolution.step and steps.begins == [0.0, 1.0]
     assert look(steps, clock, 20.0) == pytest.approx(20.0, rel=0.05)
     clock.now = 1.0
-    steps.begin(clock)  # the ramp ends
+    VibrationsOfLines({"line": steps}, clock).at_stop()  # the ramp ends
     seen = 0.0
     while steps.look < np.inf:
         assert clock.largest == resolution.step
@@ -95,7 +95,7 @@ def test_a_vibration_that_stays_or_is_not_seen_keeps_steps_short():
     _, clock, steps = watched()
     for _ in range(40):
         assert steps.amplitude() == np.inf  # no steps
-        steps.judge(clock)
+        steps.judge()
     assert steps.look < np.inf
 
 
@@ -104,14 +104,14 @@ def test_a_checkpoint_goes_on_and_a_forged_one_does_not():
     look(steps, clock, 20.0)
     steps.log(np.array([[clock.now + 0.01, 1.0, 2.0]]))
     again = watched()[2]
-    again.restore(steps.checkpoint(), clock)
+    again.restore(steps.checkpoint(), clock.now)
     assert {k: np.array(x).tolist() for k, x in again.checkpoint().items()} == {
         k: np.array(x).tolist() for k, x in steps.checkpoint().items()
     }
     for wrong in ({"look": 1e6}, {"rows": np.zeros((2, 2))}, {"from": "now"}):
         with pytest.raises(ValueError, match="vibration"):
-            again.restore(steps.checkpoint() | wrong, clock)
-    again.restore(None, clock)  # a file from before
+            again.restore(steps.checkpoint() | wrong, clock.now)
+    again.restore(None, clock.now)  # a file from before
     assert again.look > clock.now
 
 

@@ -15,7 +15,7 @@ from hybrid.errors import Outcome, SceneError
 from hybrid.kernels.junctions import bodies as k
 from hybrid.model.bodies import angles_of, body_model, frame_of
 from hybrid.scene.bodies import FreeBody
-from hybrid.simulation.new_run import new_run
+from hybrid.simulation.run import new_run
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
 from tests.scenes import cable_scene, line_between, network_scene, pinned_at

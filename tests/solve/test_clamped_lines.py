@@ -20,8 +20,7 @@ from hybrid.model.build import build
 from hybrid.model.network import build_system
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
-from hybrid.simulation.new_run import new_run
-from hybrid.simulation.run import Run
+from hybrid.simulation.run import Run, new_run
 from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
 LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]

@@ -16,8 +16,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
-from hybrid.simulation.new_run import new_run
-from hybrid.simulation.run import Run
+from hybrid.simulation.run import Run, new_run
 from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState, joined_ends
