@@ -27,8 +27,8 @@ from hybrid.designs.replay import Course, course_of, replay, with_outputs
 from hybrid.designs.tangents import NetworkOthers, Seen, Unfollowed, has_two_sides, step_of
 from hybrid.designs.wanted import Wanted, over_time, parse_wanted, peaks, smoothed
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
+from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.state.state import Floats
-from hybrid.outputs.observation import penetration
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.attachments import Spread
 from hybrid.scene.root import Scene
@@ -104,7 +104,7 @@ def by_cells(
 
 def _cell(line: LineAtRest) -> float:
     """The longest cell in which contact begins or ends, m; of a line without contact of all."""
-    lies = penetration(line.here.sea, line.state.r[:, :, None])[:, 0] > 0.0
+    lies = planes_under(line.here.sea, line.state.r)[1] > 0.0
     there = np.flatnonzero(lies[1:] != lies[:-1])
     return float(line.model.line.h[there if there.size else slice(None)].max())
 

@@ -408,7 +408,7 @@ class LoadedLine:
     def _fade_at_hinge(self, k: int, dT: Floats, size: Floats, kappa: Floats) -> None:
         """Take from curvature (N+1,) 1/m of a catenary, and its amplitudes (F, N+1, 2), the layer of a hinge at end k.
 
-        As results have it (outputs.strains), up to the first change of section; it changes with tension, whose
+        As results have it (kernels.watch.sides), up to the first change of section; it changes with tension, whose
         amplitudes are dT (F, N).
         """
         line, n, way, EI = self.line, len(size) - 1, 1 - 2 * k, self.hinges[k, 0]

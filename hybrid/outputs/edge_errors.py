@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.kernels.watch.observed_outputs import (
+    SINKING,
     WORK,
     Bed,
     Cuts,
@@ -32,7 +33,7 @@ from hybrid.kernels.watch.observed_outputs import (
     put_largest,
     refine_windows,
 )
-from hybrid.outputs.observation import Observation, sinking
+from hybrid.outputs.observation import Observation
 
 # What datasets of them begin with, and the quantities that they are of.
 EDGE_ERRORS, MISSED = "errors/edges/", ("curvature", "bending_moment")
@@ -123,11 +124,12 @@ def _windows(view: Observation, nodes: NDArray[np.int64], output: NDArray[np.int
     every = slice(None)
     bends = view.stiffness(every)[:, :2].max(axis=1) * view.of_line("hn", every)
     bends = bends * (view.of_line("element", every) != 0)
-    sinks = sinking(view.sea, view.r, view.v)
     T, EI = _of(view.T, np.minimum(nodes[:, 1:], nodes[:, :-1]), output), _of(bends, nodes, output)
     least = TAUT * np.abs(T).max(axis=1)[:, None]
     s = way * _of(view.of_line("s", every), nodes, output)
-    return Windows(s, -_of(view.depth, nodes, output), _of(sinks, nodes, output), np.maximum(T, least), EI)
+    return Windows(
+        s, -_of(view.depth, nodes, output), _of(view.bed[:, SINKING], nodes, output), np.maximum(T, least), EI
+    )
 
 
 def _line_end(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import Found, observed_joined
 from hybrid.model.mesh import Zone
-from hybrid.outputs.observation import Observation, Touchdown, links, touchdown
+from hybrid.outputs.observation import Observation, links
 from hybrid.outputs.observed_states import Grid, Rows, linear
 
 # What a batch has of the nodes and of the cells; the rest is of each output as it is.
@@ -58,7 +58,7 @@ class JoinedGrid(Grid):
         self.loads, self.changes, self.after, self._kept = first.loads, first.changes, first.after, first._kept
         self.hinges = grids[0].hinges
         self.begin = np.cumsum([0, *(grid._x.size for grid in grids)])  # nodes before each line
-        sides = np.cumsum([0, *(len(grid.side_nodes) for grid in grids)])
+        self.rows = sides = np.cumsum([0, *(len(grid.side_nodes) for grid in grids)])  # likewise sides
         self.parts = tuple(part for grid in grids for part in grid.parts)
         self.spans = []
         for grid, n, o in zip(grids, self.begin.tolist(), sides.tolist(), strict=False):
@@ -141,25 +141,11 @@ class JoinedObservation(Observation):
     def end_nodes(self) -> NDArray[np.int64]:
         return np.concatenate([self.begin[:-1], self.begin[1:] - 1])
 
-    def _end(self, x: Floats, k: int, inward: int) -> NDArray[np.int64]:
-        """Where values on cells or nodes have end k of each line."""
-        if not k:
-            return self.begin[:-1] + inward
-        return self.begin[1:] - (1 if len(x) == self.begin[-1] else 2) - inward
+    def at_end(self, x: Floats, k: int) -> Floats:
+        return np.moveaxis(x[self.begin[1:] - 1 if k else self.begin[:-1], ..., 0], 0, -1)
 
-    def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
-        return np.moveaxis(x[self._end(x, k, inward)][..., 0], 0, -1)
-
-    def put_at_end(self, x: Floats, k: int, value: Floats) -> None:
-        x[self._end(x, k, 0), ..., 0] = np.moveaxis(value, -1, 0)
-
-    def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
-        lines = np.arange(self.batch.t.size)
-        of_cell = np.repeat(lines, np.diff(self.begin))[:-1]
-        out = np.empty((self.begin[-1] + lines.size, 1))
-        out[np.arange(len(x)) + of_cell + 1] = x
-        out[self.begin[:-1] + lines, 0], out[self.begin[1:] + lines, 0] = ends
-        return out
+    def outputs_last(self, x: Floats) -> Floats:
+        return x[..., None]
 
     def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
         if dims[:1] != ("s",):
@@ -176,17 +162,11 @@ class JoinedObservation(Observation):
 
     @cached_property
     def _observed(self) -> Found:
-        x = observed_joined(self.line, self.batch, self.grid.hinges, self.marks, self.begin)
-        energy = np.ascontiguousarray(x.energy.T)
-        return Found(x.moment[..., None], x.strain[..., None], energy, x.bend[:, None], x.rods[..., None])
+        return observed_joined(self.line, self.sea, self.batch, self._along, self.begin, self._joined_grid.rows)
 
-    @cached_property
-    def touchdown(self) -> Touchdown:
-        """In one call for lines with as many nodes: those that shorter ones lack are nowhere."""
-        nodes, place = np.diff(self.begin), np.arange(np.diff(self.begin).max())[:, None]
-        at = self.begin[:-1] + np.minimum(place, nodes - 1)
-        depth = np.where(place < nodes, self.depth[at, 0], np.nan)
-        return touchdown(self.line.s[at], depth, np.moveaxis(self.r[at][..., 0], 1, 2))
+    def _between_nodes(self) -> Floats:
+        found = self._observed.layers(self.grid.s.reshape(self.batch.t.size, -1))
+        return found.reshape(-1, 3, 1)
 
     @property
     def points(self) -> Floats:

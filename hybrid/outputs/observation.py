@@ -16,9 +16,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hybrid.kernels.laws.bending_law import RIGID
-from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
@@ -32,9 +31,20 @@ from hybrid.kernels.state.report import (
     SOIL,
     STRETCH_ENERGY,
 )
-from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea
-from hybrid.outputs.observed_states import ObservedStates, across, cross, means_beside, means_on_line, size
-from hybrid.outputs.strains import EndLayer, between_nodes, part_without_spring, strains
+from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line
+from hybrid.kernels.watch.observed_outputs import (
+    ACROSS,
+    BORNE,
+    DEPTH,
+    EDGES,
+    GROUNDED,
+    NATURAL,
+    PLACES,
+    SIDE_TORQUE,
+    TWIST,
+    UNKNOWN,
+)
+from hybrid.outputs.observed_states import ObservedStates, cross, last, means_beside, means_on_line, size
 
 
 def links(batch: Batch, line: Line) -> Floats:
@@ -53,36 +63,7 @@ class Observation(ObservedStates):
     @cached_property
     def tension(self) -> Floats:
         """(ns, nb) N: of the cells, and at the ends the pull of what holds them."""
-        ends = []
-        for k in (0, 1):
-            t = self.at_end(self.d, k)
-            if len(self.d) > 1:
-                t = np.where(self._kink_beside(k), t, 1.5 * t - 0.5 * self.at_end(self.d, k, 1))
-            knows = self.has_element(k)
-            if np.any(knows):  # a clamp or guide knows the tangent
-                t = np.where(knows, self._held_tangent(k), t)
-            if self.loaded(k):
-                ends.append(self._end_tension(k))
-            else:
-                force = self.reaction(k) if k else -self.reaction(k)
-                ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
-        return self.grid.held @ self.with_ends(self.T, ends)
-
-    def _held_tangent(self, k: int) -> Floats:
-        """Tangent (3, nb) of the line at the clamp at end k, not normalized; as `watch.extremes.beyond_spring`."""
-        t, d = self.batch.frame[:, k, 2::3].T, self.at_end(self.d, k)
-        part = 0.5 * self.at_end(self.cell_lengths, k) / self.at_end(self.of_line("hn", slice(None)), k)
-        if part.min() > RIGID:
-            return t
-        angle = np.arccos(np.clip((t * d).sum(axis=0), -1.0, 1.0))
-        n = len(self.d)
-        if self.line.slip_law.size:
-            bend = self.element_strains[k * n, :2] - self.of_line("k0", k * n)[:2]
-            part = part_without_spring(self, k * n, k * (n - 1), bend)
-        elif self.line.bend_law.size:
-            part = part_without_spring(self, k * n, k * (n - 1), np.stack([angle, 0.0 * angle]))
-        between = np.sin(part * angle) * t + np.sin((1.0 - part) * angle) * d
-        return np.where((part > RIGID) | (angle < 1e-6), t, between)
+        return self.grid.held @ self.outputs_last(self._observed.held)
 
     @cached_property
     def tangent(self) -> Floats:
@@ -122,13 +103,12 @@ class Observation(ObservedStates):
         Found at the nodes, and interpolated: the tangent between nodes, off by the square of the cell length, would
         make a torque of the bending moment.
         """
-        torque = _node_torques(self)[self.grid.side_nodes]
-        return self.grid.sides @ (torque + _passed_torques(self) if self.batch.turn.size else torque)
+        return self.grid.sides @ self.sides[:, SIDE_TORQUE]
 
     @cached_property
     def bending_moment(self) -> Floats:
         """(ns, nb) N m."""
-        return size(self.grid.sides @ across(self.node_moment, self.node_tangent)[self.grid.side_nodes])
+        return size(self.grid.sides @ self.sides[:, ACROSS:])
 
     @property
     def shear(self) -> Floats:
@@ -141,34 +121,31 @@ class Observation(ObservedStates):
 
     @cached_property
     def curvature_twist(self) -> Floats:
-        """(ns, 2, nb) 1/m."""
-        strains = self._strains
-        bend = self.bend_directions * strains[:, :1]
-        found = self.grid.sides @ np.concatenate([bend, strains[:, 1:]], axis=1)
-        for layer, end in self._taken_at_ends:  # which is no straight line in cells that are long for it
-            direction = self.bend_directions[layer.rows[0]]
-            for points, less in between_nodes(self, layer):
-                found[points, :-1] += (less * end)[:, None] * direction
-        return np.stack([np.sqrt((found[:, :-1] ** 2).sum(axis=1)), found[:, -1]], axis=1)
+        """(ns, 2, nb) 1/m.
+
+        Between nodes the vector of curvature is interpolated, across the plane of the bend: its size alone would stay
+        large where a line bends to one side before a point and to the other side after it.
+        """
+        found = self.grid.sides @ self.sides[:, : TWIST + 1]
+        if self.grid.hinges[:2, 0].any():  # whose layer is no straight line in cells that are long for it
+            found[:, :TWIST] += self._between_nodes()
+        return np.stack([size(found[:, :TWIST]), found[:, TWIST]], axis=1)
+
+    def _between_nodes(self) -> Floats:
+        """(ns, 3, nb) 1/m, of layers at ends of catenaries."""
+        points = np.broadcast_to(self.grid.points.T, (self.columns, len(self.grid.points)))
+        return last(self._observed.layers(points))
 
     @property
     def curvature_on_sides(self) -> Floats:
         """(n sides, nb) 1/m, at the nodes of the grid's stretches."""
-        return np.abs(self._strains[:, 0])
-
-    @cached_property
-    def _strains_and_taken(self) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
-        return strains(self)
+        return size(self.sides[:, :TWIST])
 
     @property
-    def _strains(self) -> Floats:
-        """Curvature and twist (n sides, 2, nb), 1/m."""
-        return self._strains_and_taken[0]
-
-    @property
-    def _taken_at_ends(self) -> list[tuple[EndLayer, Floats]]:
-        """Layers that catenaries have not at their ends, and the curvature (nb,) 1/m of each without that."""
-        return self._strains_and_taken[1]
+    def bends_without_natural(self) -> tuple[Floats, NDArray[np.bool_]]:
+        """Curvature (ns, nb) 1/m less the natural one, and where it is unknown."""
+        a, b, unknown = np.moveaxis(self.grid.sides @ self.sides[:, NATURAL : UNKNOWN + 1], 1, 0)
+        return np.hypot(a, b), unknown > 0.0
 
     @cached_property
     def link(self) -> Floats:
@@ -194,47 +171,25 @@ class Observation(ObservedStates):
             return np.asarray(force)
         return np.where(held, force, b.force[:, k].T)
 
-    def loaded(self, k: int) -> bool:
-        """Whether there is a point load at end k."""
-        s = self.line.s
-        return any(abs(x - s[-k]) < 1e-9 * s[-1] for x in self.grid.loads)
-
-    def _end_tension(self, k: int) -> Floats:
-        """Tension (nb,) N of the cable at end k, extrapolated from its last cells."""
-        T, h = self.T, self.cell_lengths
-        if len(h) == 1:
-            return np.asarray(T[0])
-        T0, T1, h0, h1 = (self.at_end(x, k, inward) for x in (T, h) for inward in (0, 1))
-        return np.where(self._kink_beside(k), T0, T0 + (T0 - T1) * h0 / (h0 + h1))
-
-    def _kink_beside(self, k: int) -> Floats:
-        """Whether a point load or change of section is one cell away from end k, of all outputs (1,) or of each (nb,).
-
-        Nothing is extrapolated across it.
-        """
-        s = self.line.s[:, None]
-        beside, near = self.at_end(s, k, 1), 1e-9 * self.line.s[-1]
-        return np.any([np.abs(beside - x) < near for x in self.grid.loads] or [np.zeros(1, bool)], axis=0)
-
     # ---- seabed and energies, of what was computed --------------------------------------------
 
-    @cached_property
+    @property
     def depth(self) -> Floats:
         """(N+1, nb) m, below where contact begins."""
-        return penetration(self.sea, self.r)
+        return self.bed[:, DEPTH]
 
-    @cached_property
+    @property
     def touchdown(self) -> Touchdown:
-        s = self._varied["s"].T if "s" in self._varied else self.line.s[:, None]
-        return touchdown(s, self.depth, self.r)
+        """What lies on the seabed."""
+        x = self._observed.touch.T
+        return Touchdown(x[EDGES:PLACES], x[PLACES:GROUNDED].reshape(2, 3, -1), x[GROUNDED])
 
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
         if self.line.bits & SOIL:
             return np.asarray(self.grid.chords @ np.ascontiguousarray(self.batch.soil[:, :, PRESSES].T))
-        q = contact_pressure(self.sea, self.depth, sinking(self.sea, self.r, self.v))
-        return np.asarray(self.grid.chords @ carried(self.cell_lengths, q))
+        return np.asarray(self.grid.chords @ self.bed[:, BORNE])
 
     @property
     def self_contact(self) -> Floats:
@@ -263,7 +218,7 @@ class Observation(ObservedStates):
 
         potential: of weight and buoyancy; of contact: stored by the seabed, and by contact of the line with itself.
         """
-        kinetic, bending, torsion, stretch, potential = self._observed.energy
+        kinetic, bending, torsion, stretch, potential = last(self._observed.energy)
         if self.batch.turn.size:
             # One by one: the last digit of a product over a batch depends on its size, and so would a resumed run's.
             each = zip(self.batch.turn[:, :, TURN], self.batch.T, strict=True)
@@ -275,31 +230,6 @@ class Observation(ObservedStates):
             "contact": self.batch.report[:, SEABED_ENERGY],
             "self_contact": self.batch.report[:, SELF_CONTACT_ENERGY],
         }  # fmt: skip
-
-
-def _node_torques(view: ObservedStates) -> Floats:
-    """(N+1, nb) N m: of the twist of elements; at ends of the moment there."""
-    line, nodes = view.line, slice(None)
-    strain = view.element_strains[:, 2] - view.of_line("k0", nodes)[:, 2]
-    if line.tension_twist.size:
-        by_tension = view.of_line("tension_twist", nodes) * view.T
-        strain = strain + np.pad(by_tension, ((0, 1), (0, 0))) + np.pad(by_tension, ((1, 0), (0, 0)))
-    torque = np.where(line.element[:, None], view.stiffness(nodes)[:, 2] * strain, 0.0)
-    for k in (0, 1):
-        moment, tangent = view.at_end(view.node_moment, k), view.at_end(view.node_tangent, k)
-        view.put_at_end(torque, k, (moment * tangent).sum(axis=0))
-    return torque
-
-
-def _passed_torques(view: ObservedStates) -> Floats:
-    """Torque (n sides, nb) N m that catenary zones pass on, on their nodes and the joints of rods beside them."""
-    out = np.zeros((len(view.grid.side_nodes), view.batch.t.size))
-    for z, (first, last) in enumerate(view.line.torsion[:, :2].astype(int)):
-        for a, b, o in view.grid.spans:
-            low, high = max(a, first), min(b, last)
-            if low <= high:
-                out[o + low - a : o + high - a + 1] = view.batch.turn[:, z, TORQUE]
-    return out
 
 
 @dataclass(frozen=True)
@@ -317,95 +247,9 @@ class Probe:
     frame: str = ""
 
 
-# Where a cable touches the seabed, seen from a batch of states: gaps, lift-off points, contact force.
-
-
 class Touchdown(NamedTuple):
     """What lies on the seabed, of nb states.  Edges are NaN when nothing does."""
 
     edges: Floats  # (2, nb) m, arc lengths of the first and the last point in contact
     places: Floats  # (2, 3, nb) m, where they are
     grounded: Floats  # (nb,) m, length in contact
-
-
-def penetration(sea: Sea, r: Floats) -> Floats:
-    """How deep points (n, 3, nb) lie below where contact begins, m: half an onset above the seabed; negative above."""
-    if not sea.bed_x.size:
-        return np.asarray(sea.offset + 0.5 * sea.onset - _along(sea.normal, r))
-    n, _, nb = r.shape
-    return planes_under(sea, np.moveaxis(r, 1, 2).reshape(-1, 3))[1].reshape(n, nb)
-
-
-def sinking(sea: Sea, r: Floats, v: Floats) -> Floats:
-    """Rates of `penetration` (n, nb), m/s, of points (n, 3, nb) that move by v."""
-    if not sea.bed_x.size:
-        return -_along(sea.normal, v)
-    n, _, nb = r.shape
-    normals = planes_under(sea, np.moveaxis(r, 1, 2).reshape(-1, 3))[0].reshape(n, nb, 3)
-    return -_along(np.moveaxis(normals, 2, 0), v)
-
-
-def _along(normal: Floats, x: Floats) -> Floats:
-    """Component of vectors (n, 3, nb) along a normal; by no library, whose sums depend on the number of outputs."""
-    return np.asarray(normal[0] * x[:, 0] + normal[1] * x[:, 1] + normal[2] * x[:, 2])
-
-
-def sum_down(x: Floats) -> Floats:
-    """Sums along the first axis in its order, the same bits for any number of outputs."""
-    return np.asarray(np.add.accumulate(x, axis=0)[-1])
-
-
-def touchdown(s: Floats, p: Floats, r: Floats) -> Touchdown:
-    """First and last contact, exact for the chords that the contact force is integrated over.
-
-    s: (N+1, 1) m, or (N+1, nb) where it differs; p: (N+1, nb) m, as of `penetration`; NaN: no such node in an output;
-    r: (N+1, 3, nb) m, of the nodes.
-    """
-    below = np.flatnonzero((p > 0.0).any(axis=1))  # nodes that touch in any output
-    if not below.size:
-        nb = p.shape[1]
-        return Touchdown(np.full((2, nb), np.nan), np.full((2, 3, nb), np.nan), np.zeros(nb))
-    low, high = max(int(below[0]) - 1, 0), min(int(below[-1]) + 1, len(s) - 1)
-    a, b, r = p[low:high], p[low + 1 : high + 1], r[low : high + 1]
-    s = np.broadcast_to(s[low : high + 1], (len(r), p.shape[1]))
-    touching = np.maximum(a, b) > 0.0
-    # the part x0 .. x1 of every touching cell that is in contact
-    change = np.where(b == a, 1.0, b - a)
-    zero = np.clip(np.where(b == a, 0.0, -a / change), 0.0, 1.0)
-    x0 = np.where(a <= 0.0, zero, 0.0)
-    x1 = np.where(b <= 0.0, zero, 1.0)
-    outputs = np.arange(p.shape[1])
-    cells = np.stack([touching.argmax(axis=0), len(a) - 1 - touching[::-1].argmax(axis=0)])
-    x = np.stack([x0[cells[0], outputs], x1[cells[1], outputs]])
-    h = np.diff(s, axis=0)
-    edges = s[cells, outputs] + x * h[cells, outputs]
-    # (2, nb, 3), because numpy puts what is indexed by arrays first
-    near, far = r[cells, :, outputs], r[cells + 1, :, outputs]
-    places = np.moveaxis(near + x[:, :, None] * (far - near), -1, 1)
-    grounded = sum_down(h * np.where(touching, x1 - x0, 0.0))
-    lies = touching.any(axis=0)
-    return Touchdown(np.where(lies, edges, np.nan), np.where(lies, places, np.nan), grounded)
-
-
-def carried(h: Floats, q: Floats) -> Floats:
-    """Force per length N/m that the nodes bear of a pressure q (N+1, nb) N/m: of each node over its half cells.
-
-    It is what stands in the balance of the nodes, so that it has the weight of what lies still; q itself swings about
-    that by up to a quarter beside an anchor and at the touchdown, where cells are longer than sqrt(T/k), over which the
-    bed takes up the line.  h: (N,) or (N, nb) m, lengths of the cells.
-    """
-    h = h.reshape(len(h), -1)
-    force, length = np.zeros_like(q), np.zeros((len(q), h.shape[1]))
-    force[:-1] += h * (2.0 * q[:-1] + q[1:]) / 6.0
-    force[1:] += h * (q[:-1] + 2.0 * q[1:]) / 6.0
-    length[:-1] += 0.5 * h
-    length[1:] += 0.5 * h
-    return np.asarray(force / length)
-
-
-def contact_pressure(sea: Sea, p: Floats, v: Floats) -> Floats:
-    """Force per length N/m of the seabed along its normal, at points of penetration p (m) with the rate v (m/s)."""
-    o = sea.onset
-    linear = sea.stiffness * (p - 0.5 * o) + sea.damping * v
-    onset = 0.5 * sea.stiffness * p * p / o + sea.damping * v * p / o
-    return np.where(p <= 0.0, 0.0, np.maximum(np.where(p < o, onset, linear), 0.0))

@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
-from hybrid.kernels.state.report import PLANAR
+from hybrid.kernels.state.books import LOADED, SEAM
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
-from hybrid.kernels.watch.observed_outputs import Found, observed
-from hybrid.kernels.watch.soft_rods import BENT, C
+from hybrid.kernels.watch.observed_outputs import Along, Found, observed
 from hybrid.model.mesh import Zone
 
 Integers = NDArray[np.int64]
@@ -87,24 +86,6 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
         bounds = [zone.s_a, *kinks, zone.s_b]
         parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
     return tuple(parts)
-
-
-class SpanEnds(NamedTuple):
-    """The ends of stretches, first all beginnings, then all ends."""
-
-    row: Integers  # of the sides of all nodes
-    node: Integers
-    cell: Integers  # beside it, in the stretch
-    inner: Integers  # the next node in the stretch
-    inward: Integers  # 1 or -1: from row to row, into the stretch
-
-
-def ends_of(spans: Integers) -> SpanEnds:
-    """Ends of stretches (n, 3): first node, last node, row of the first side."""
-    a, b, o = spans.T
-    one = np.ones_like(a)
-    pairs = (o, o + b - a), (a, b), (a, b - 1), (a + 1, b - 1), (one, -one)
-    return SpanEnds(*(np.concatenate(pair) for pair in pairs))
 
 
 class Grid:
@@ -378,40 +359,21 @@ class ObservedStates:
         """Nodes at ends of the line."""
         return 0, self.line.h.size
 
-    @cached_property
-    def is_end(self) -> NDArray[np.bool_]:
-        """(N+1,) whether nodes are those."""
-        found = np.zeros(self.line.s.size, bool)
-        found[np.asarray(self.end_nodes)] = True
-        return found
+    def at_end(self, x: Floats, k: int) -> Floats:
+        """Of values (n, ..., nb) on nodes that at end k: (..., nb)."""
+        return x[-1 if k else 0]
 
-    def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
-        """Of values (n, ..., nb) on cells or nodes that at end k, or so many inward: (..., nb)."""
-        return x[-1 - inward if k else inward]
-
-    def put_at_end(self, x: Floats, k: int, value: Floats) -> None:
-        """Set values (n, ..., nb) on cells or nodes at end k to (..., nb)."""
-        x[-1 if k else 0] = value
-
-    def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
-        """Values (N, nb) of cells between those (nb,) of both ends."""
-        return np.concatenate([ends[0][None], x, ends[1][None]])
+    def outputs_last(self, x: Floats) -> Floats:
+        """What has been found along the line (nb, n, ...) as (n, ..., nb)."""
+        return last(x)
 
     def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
         """Values with the outputs first, of those that a probe with these dimensions has found; a new array."""
         return np.array(x.transpose(x.ndim - 1, *range(x.ndim - 1)), order="C")
 
-    def directors(self, cells: NDArray[np.int64]) -> Floats:
-        """First directors (n, 3, nb) of cells."""
-        return np.moveaxis(self.batch.a1[:, cells], 0, -1)
-
     def stiffness(self, nodes: slice | NDArray[np.int64]) -> Floats:
         """Stiffness (n, 3, nb or 1) N m of the elements at nodes."""
         return np.moveaxis(self.batch.kb[:, nodes], 0, -1) if self.batch.kb.size else self.line.kb[nodes, :, None]
-
-    def has_element(self, k: int) -> Any:
-        """Whether an element sits at end k, of all outputs or of each (nb,)."""
-        return bool(self.line.element[-k])
 
     @property
     def cell_lengths(self) -> Floats:
@@ -452,54 +414,46 @@ class ObservedStates:
 
     @cached_property
     def _observed(self) -> Found:
-        """What the outputs mean, the outputs last."""
-        M, strain, energy, bend, rods = observed(self.line, self.batch, self.grid.hinges, self.marks, self._varied)
-        if len(M) < self.batch.t.size:  # a catenary has neither
-            M = strain = np.broadcast_to(np.zeros(1), (self.batch.t.size, *M.shape[1:]))
-        return Found(last(M), last(strain), last(energy), bend.T, last(rods))
+        """What the outputs mean, the outputs first."""
+        found = observed(self.line, self.sea, self.batch, self._along, self._varied)
+        return found._replace(moment=np.broadcast_to(found.moment, (self.batch.t.size, *found.moment.shape[1:])))
 
     @property
-    def marks(self) -> NDArray[np.int8]:
-        """(N+1,) 1 at nodes with two sides."""
-        return (np.bincount(self.grid.side_nodes, minlength=self.line.s.size) > 1).astype(np.int8)
+    def _along(self) -> Along:
+        grid, s, ends = self.grid, self.line.s, self.line.s[[0, -1]]
+        loaded = [any(abs(x - end) < 1e-9 * s[-1] for x in grid.loads) for end in ends]
+        marks = np.bincount(grid.side_nodes, minlength=s.size) > 1
+        seams = np.isin(np.arange(s.size), self.changes)
+        return Along(
+            grid.hinges,
+            np.array(loaded, np.int8),
+            (marks * (LOADED + SEAM * seams)).astype(np.int8),
+            len(grid.side_nodes),
+        )
 
-    @property
-    def restored(self) -> Floats:
-        """(N+1, nb) 1/m, curvature of rods that lack stiffness, if they had it, else NaN; (0, nb): none is known."""
-        return self._observed.rods[:, BENT]
-
-    @property
-    def parts_of_stiffness(self) -> Floats:
-        """(N+1, nb) of elements; 1 where nothing lacks or is known."""
-        rods = self._observed.rods
-        return rods[:, C] if len(rods) else np.ones((self.line.s.size, self.columns))
-
-    @property
-    def element_strains(self) -> Floats:
-        """(N+1, 3, nb) rad, of the elements at nodes, as of kernels.watch.observed_outputs."""
-        return self._observed.strain
-
-    @property
-    def bends(self) -> Floats:
-        """(N+1, nb) 1/m, from cell to cell, as of kernels.watch.observed_outputs."""
-        return self._observed.bend
-
-    # ---- moments, and which way the line bends ------------------------------------------------
-
-    @property
-    def node_moment(self) -> Floats:
-        """(N+1, 3, nb) N m, inertial."""
-        return self._observed.moment
+    def loaded(self, k: int) -> bool:
+        """Whether there is a point load at end k."""
+        return bool(self._along.loaded[k])
 
     @cached_property
-    def node_tangent(self) -> Floats:
-        """(N+1, 3, nb): halfway between the cells, at an end that of its holder or cell."""
-        d = self.d
-        t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
-        for k in (0, 1):
-            held = np.asarray(self.has_element(k))
-            self.put_at_end(t, k, np.where(held, self.batch.frame[:, k, 2::3].T, self.at_end(d, k)))
-        return np.asarray(t / np.maximum(size(t), 1e-12)[:, None])
+    def bends(self) -> Floats:
+        """(N+1, nb) 1/m, from cell to cell, as of kernels.watch.observed_outputs."""
+        return self.outputs_last(self._observed.bend)
+
+    @cached_property
+    def node_moment(self) -> Floats:
+        """(N+1, 3, nb) N m, inertial."""
+        return self.outputs_last(self._observed.moment)
+
+    @cached_property
+    def sides(self) -> Floats:
+        """(n sides, SIDE, nb) of kernels.watch.observed_outputs."""
+        return self.outputs_last(self._observed.sides)
+
+    @cached_property
+    def bed(self) -> Floats:
+        """(N+1, ON_BED, nb), likewise."""
+        return self.outputs_last(self._observed.bed)
 
     @property
     def side_is_rod(self) -> NDArray[np.bool_]:
@@ -507,32 +461,8 @@ class ObservedStates:
         spans = np.array(self.grid.spans).reshape(-1, 3)
         return np.repeat([zone.kind == "rod" for zone in self.grid.parts], spans[:, 1] - spans[:, 0] + 1)
 
-    @cached_property
-    def bend_directions(self) -> Floats:
-        """Directions (n sides, 3, nb) of the curvature that was computed, across both chords beside a node.
-
-        Of a line in a plane (n sides, 1, nb), 1 or -1 along the normal.  At ends of the line that of the moment there;
-        at ends of stretches that no element bends across, that of the next node in the stretch, as at ends that are
-        bent without a moment.
-        """
-        nodes, d, line = self.grid.side_nodes, self.d, self.line
-        inner = np.clip(nodes, 1, max(len(d) - 1, 1))
-        out = directions_of(line, cross(d[inner - 1], d[np.minimum(inner, len(d) - 1)]))
-        spans = np.array(self.grid.spans).reshape(-1, 3)
-        rods, at = np.tile([zone.kind == "rod" for zone in self.grid.parts], 2), ends_of(spans)
-        outer = self.is_end[at.node]
-        beside = np.flatnonzero(outer | ~rods | (line.element[at.node] == 0))
-        out[at.row[beside]] = out[at.row[beside] + at.inward[beside]]
-        bent = np.flatnonzero(outer & rods & ~line.k0[at.node].any(axis=1))
-        moment = across(self.node_moment[at.node[bent]], self.node_tangent[at.node[bent]])
-        out[at.row[bent]] = np.where(size(moment)[:, None] > 0.0, directions_of(line, moment), out[at.row[bent]])
-        return out
-
 
 # Vectors at many places of many outputs: arrays (n, 3, nb).
-
-# Of a node where the line is straight.
-ANY_DIRECTION = np.array([0.0, 1.0, 0.0])[:, None]
 
 
 def cross(a: Floats, b: Floats) -> Floats:
@@ -552,16 +482,3 @@ def dot(a: Floats, b: Floats) -> Floats:
 def size(a: Floats) -> Floats:
     """Length of vectors (n, 3, nb)."""
     return np.asarray(np.sqrt(dot(a, a)))
-
-
-def across(moment: Floats, tangent: Floats) -> Floats:
-    """Of moments (n, 3, nb) N m what bends: the part across the tangent."""
-    return np.asarray(moment - dot(moment, tangent)[:, None] * tangent)
-
-
-def directions_of(line: Line, x: Floats) -> Floats:
-    """Of vectors (n, 3, outputs), or on which side of the plane of the line they are."""
-    if line.bits & PLANAR:
-        return np.where(np.einsum("j,njk->nk", line.plane[2], x) < 0.0, -1.0, 1.0)[:, None]
-    length = size(x)[:, None]
-    return np.where(length > 0.0, x / np.where(length > 0.0, length, 1.0), ANY_DIRECTION)

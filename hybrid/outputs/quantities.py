@@ -19,7 +19,6 @@ from hybrid.kernels.watch import named_quantities as k
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import bending_stiffness, outer_diameter
 from hybrid.outputs.observation import Observation, Probe
-from hybrid.outputs.strains import bends_without_natural
 from hybrid.store.capacity import CLAUSES, E301, F201, Row, moment_of
 from hybrid.store.capacity import CODE_NAME as CODE_USED
 from hybrid.store.capacity import NAME as CAPACITY_USED
@@ -34,29 +33,42 @@ if TYPE_CHECKING:
     from hybrid.scene.schema import LineScene
 
 
-class Pipes:
+class OfSections:
+    """The sections of one line, and which of them points are of."""
+
+    def __init__(self, scene: LineScene) -> None:
+        whole, begin = whole_scene(scene)
+        self.sections = whole.cable.sections
+        lengths = np.array([x.length for x in self.sections])
+        self.ends = begin + np.cumsum(lengths)
+        self.begins, self._near = np.concatenate([[begin], self.ends[:-1]]), 1e-9 * lengths.sum()
+        fluid = scene.environment.fluid
+        self.gravity = scene.environment.gravity
+        self.water = fluid.density * self.gravity if fluid is not None else 0.0
+        self.surface = 0.0 if fluid is None or fluid.surface is None else fluid.surface
+
+    def numbers(self, s: Floats, after: bool) -> np.ndarray:
+        """Numbers of the sections at arc lengths s (m), after or before where sections meet."""
+        return np.searchsorted(self.ends[:-1], s + (self._near if after else -self._near))
+
+
+class Pipes(OfSections):
     """The pipes of one line.  Only for a scene that has some."""
 
     def __init__(self, scene: LineScene) -> None:
-        fluid = scene.environment.fluid
-        density = fluid.density if fluid is not None else 0.0
-        surface = 0.0 if fluid is None or fluid.surface is None else fluid.surface
-        whole, begin = whole_scene(scene)
-        sections = whole.cable.sections
-        self._bounds = begin + np.cumsum([x.length for x in sections])[:-1]
-        self._near = 1e-9 * sum(x.length for x in sections)
-        self.rows = np.zeros((len(sections), k.WALL))  # of kernels.watch.named_quantities
-        self.rows[:, k.SECTION_END] = begin + np.cumsum([x.length for x in sections])
-        self.rows[:, k.WATER], self.rows[:, k.SURFACE] = density * scene.environment.gravity, surface
-        for row, x in zip(self.rows, sections, strict=True):
+        super().__init__(scene)
+        self.rows = np.zeros((len(self.sections), k.WALL))  # of kernels.watch.named_quantities
+        self.rows[:, k.SECTION_END] = self.ends
+        self.rows[:, k.WATER], self.rows[:, k.SURFACE] = self.water, self.surface
+        for row, x in zip(self.rows, self.sections, strict=True):
             row[k.OUTER] = x.diameter or 0.0
             if (p := x.pipe) is not None:
                 row[k.OUTER] = p.outer_diameter or x.diameter or np.nan
                 row[k.INNER], row[k.MODULUS] = row[k.OUTER] - 2.0 * p.wall, p.modulus
-                row[k.INSIDE], row[k.INSIDE_Z] = p.pressure, surface if p.pressure_z is None else p.pressure_z
-                row[k.CONTENT] = p.content_density * scene.environment.gravity
+                row[k.INSIDE], row[k.INSIDE_Z] = p.pressure, self.surface if p.pressure_z is None else p.pressure_z
+                row[k.CONTENT] = p.content_density * self.gravity
                 row[k.NATURAL] = np.hypot(*(x.intrinsic_curvature or (0.0, 0.0))[:2])
-        limits = [x.pipe.max_stress if x.pipe is not None else None for x in sections]
+        limits = [x.pipe.max_stress if x.pipe is not None else None for x in self.sections]
         self.limits = np.array([np.nan if x is None else x for x in limits], float)
 
     def probes(self) -> dict[str, Probe]:
@@ -70,26 +82,23 @@ class Pipes:
 
     def largest_allowed(self, s: Floats, after: bool) -> Floats:
         """Largest stress (ns,) Pa allowed at arc lengths s (m), after or before where sections meet; NaN: any."""
-        return self.limits[self._sections(s, after)]
+        return self.limits[self.numbers(s, after)]
 
     def gains(self, s: Floats, after: bool) -> tuple[Floats, Floats]:
         """By how much a stress rises at most with tension (ns,) 1/m2 and with curvature (ns,) Pa m, likewise."""
-        rows = self.rows[self._sections(s, after)]
+        rows = self.rows[self.numbers(s, after)]
         outer, modulus = rows[:, k.OUTER], np.where(rows[:, k.MODULUS] > 0.0, rows[:, k.MODULUS], np.nan)
         area = np.where(np.isnan(modulus), np.nan, 0.25 * np.pi * (outer**2 - rows[:, k.INNER] ** 2))
         return 1.0 / area, 0.5 * modulus * outer
 
     def has_wall(self, s: Floats) -> np.ndarray:
         """(ns,) bool, whether the sections at arc lengths s (m), away from where they meet, are pipes."""
-        return np.asarray(self.rows[self._sections(s, True), k.MODULUS] > 0.0)
-
-    def _sections(self, s: Floats, after: bool) -> np.ndarray:
-        return np.searchsorted(self._bounds, s + (self._near if after else -self._near))
+        return np.asarray(self.rows[self.numbers(s, True), k.MODULUS] > 0.0)
 
     def _observed(self, v: Observation, bend: Floats) -> tuple[Floats, Floats]:
         """Wall tension (ns, nb) N and stress (ns, nb) Pa; bend: (2, ns, nb) curvature 1/m and torque N m."""
         shape = v.tension.shape
-        sections = np.broadcast_to(self._sections(v.grid.points, v.grid.after), shape)
+        sections = np.broadcast_to(self.numbers(v.grid.points, v.grid.after), shape)
         force, stress = np.empty(shape), np.empty(shape)
         arrays = (np.ascontiguousarray(x) for x in (sections, (v.grid.nodes @ v.r)[:, 2], v.tension, bend))
         k.observe_pipes(self.rows, *arrays, force, stress)
@@ -102,25 +111,20 @@ class Pipes:
     def von_mises(self, v: Observation) -> Floats:
         """(ns, nb) Pa: the largest of the four points where stress is largest, by Lame, bending and torsion."""
         curvature = v.curvature_twist[:, 0]
-        natural = self.rows[self._sections(v.grid.points, v.grid.after), k.NATURAL]
+        natural = self.rows[self.numbers(v.grid.points, v.grid.after), k.NATURAL]
         if np.any(natural > 0.0):
-            bent, unknown = bends_without_natural(v, v.curvature_on_sides)
+            bent, unknown = v.bends_without_natural
             bent = np.where(unknown, curvature + natural, bent)
             curvature = np.where(natural > 0.0, bent, curvature)
         return self._observed(v, np.stack([curvature, v.torque]))[1]
 
 
-class Capacities:
+class Capacities(OfSections):
     """The capacity polygons of one line.  Only for a scene that has some."""
 
     def __init__(self, scene: LineScene) -> None:
-        whole, begin = whole_scene(scene)
-        sections = whole.cable.sections
-        ends = begin + np.cumsum([x.length for x in sections])
-        self._ends, self._near = ends[:-1], 1e-9 * sum(x.length for x in sections)
-        self._corners = [None if x.capacity is None else np.array(x.capacity, float) for x in sections]
-        self._begins = np.concatenate([[begin], ends[:-1]])
-        self._whole = ends
+        super().__init__(scene)
+        self._corners = [None if x.capacity is None else np.array(x.capacity, float) for x in self.sections]
 
     def probes(self) -> dict[str, Probe]:
         """Probes by name."""
@@ -129,8 +133,7 @@ class Capacities:
 
     def used(self, v: Observation) -> Floats:
         """(ns, nb) %."""
-        s, curvature = v.grid.points, v.curvature_twist[:, 0]
-        section = np.searchsorted(self._ends, s + (self._near if v.grid.after else -self._near))
+        section, curvature = self.numbers(v.grid.points, v.grid.after), v.curvature_twist[:, 0]
         found = np.full(v.tension.shape, np.nan)
         for i, corners in enumerate(self._corners):
             if corners is not None:
@@ -140,28 +143,21 @@ class Capacities:
     def rows(self) -> Floats:
         """(K, 4): from and to (m), tension (N) and curvature (1/m) of each corner of each section that has any."""
         found = [
-            np.column_stack([np.full(len(x), self._begins[i]), np.full(len(x), self._whole[i]), x])
+            np.column_stack([np.full(len(x), self.begins[i]), np.full(len(x), self.ends[i]), x])
             for i, x in enumerate(self._corners)
             if x is not None
         ]
         return np.concatenate(found)
 
 
-class Codes:
+class Codes(OfSections):
     """The codes of one line.  Only for a scene that has some."""
 
     def __init__(self, scene: LineScene) -> None:
-        fluid, gravity = scene.environment.fluid, scene.environment.gravity
-        self._water = fluid.density * gravity if fluid is not None else 0.0
-        self._surface = 0.0 if fluid is None or fluid.surface is None else fluid.surface
-        self._gravity = gravity
-        whole, begin = whole_scene(scene)
-        sections = whole.cable.sections
-        ends = begin + np.cumsum([x.length for x in sections])
-        begins = np.concatenate([[begin], ends[:-1]])
-        self._ends, self._near = ends[:-1], 1e-9 * sum(x.length for x in sections)
-        self._rows = [self._row(*x) for x in zip(sections, begins.tolist(), ends.tolist(), strict=True)]
-        self._kinds = list(dict.fromkeys(x.code.kind for x in sections if x.code is not None))
+        super().__init__(scene)
+        of = zip(self.sections, self.begins.tolist(), self.ends.tolist(), strict=True)
+        self._rows = [self._row(*x) for x in of]
+        self._kinds = list(dict.fromkeys(x.code.kind for x in self.sections if x.code is not None))
 
     def _row(self, section: Section, first: float, last: float) -> Row | None:
         code, pipe = section.code, section.pipe
@@ -183,8 +179,8 @@ class Codes:
         tube = pipe.modulus * np.pi / 64.0 * (outer**4 - (outer - 2.0 * pipe.wall) ** 4)
         natural = float(np.hypot(*(section.intrinsic_curvature or (0.0, 0.0))[:2]))
         of_bend = (max(bending_stiffness(section)) or tube, natural)
-        z = self._surface if pipe.pressure_z is None else pipe.pressure_z
-        pressures = (pipe.pressure, z, pipe.content_density * self._gravity, self._water, self._surface)
+        z = self.surface if pipe.pressure_z is None else pipe.pressure_z
+        pressures = (pipe.pressure, z, pipe.content_density * self.gravity, self.water, self.surface)
         return Row(first, last, F201, *numbers, *of_wall, code.ovality, code.fabrication, *pressures, *of_bend)
 
     def probes(self) -> dict[str, Probe]:
@@ -194,8 +190,7 @@ class Codes:
 
     def used(self, v: Observation) -> Floats:
         """(ns, nb) %."""
-        s = v.grid.points
-        section = np.searchsorted(self._ends, s + (self._near if v.grid.after else -self._near))
+        section = self.numbers(v.grid.points, v.grid.after)
         z, found = (v.grid.nodes @ v.r)[:, 2], np.full(v.tension.shape, np.nan)
         catenary = np.asarray(v.grid.sides @ (~v.side_is_rod[:, None]).astype(float)) > 0.0
         for i, row in enumerate(self._rows):
@@ -229,10 +224,9 @@ def _rows(asked: Sequence[Quantity], line: str | None) -> tuple[Floats, Floats]:
 
 def _radii(scene: LineScene) -> Floats:
     """(S, 2) m, where the sections of a line end, and their radii; 0 where no diameter is given."""
-    whole, begin = whole_scene(scene)
-    lengths = np.array([x.length for x in whole.cable.sections])
-    ends = np.cumsum(lengths)
-    return np.column_stack([begin + ends, 0.5 * np.nan_to_num(outer_diameter(whole, ends - 0.5 * lengths))])
+    (whole, begin), ends = whole_scene(scene), OfSections(scene).ends
+    middles = np.diff(ends, prepend=begin)
+    return np.column_stack([ends, 0.5 * np.nan_to_num(outer_diameter(whole, ends - begin - 0.5 * middles))])
 
 
 def _fill(row: Floats, reached: Floats, q: Quantity, seabed: bool, rows: list[Floats]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.machine.compile import entry, is_warm
 from hybrid.kernels.mesh.remesh import ask_cells, change_cells, put_cells
+from hybrid.kernels.state.report import SEABED
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
@@ -179,10 +180,11 @@ def payout_kernels() -> tuple[Any, ...]:
 
 
 def _compile_outputs(model: Model) -> None:
-    from hybrid.kernels.watch.observed_outputs import observe_outputs, observe_soft_rods
+    from hybrid.kernels.watch.observed_outputs import observe_bed, observe_outputs
 
-    observe_soft_rods(np.zeros((0, 0), np.int64))
     observe_outputs(np.zeros((0, 0), np.int64))
+    if model.line.bits & SEABED:
+        observe_bed(np.zeros((0, 0), np.int64), model.sea.values)
     stored_energy(model.line, model.sea.values, model.start.r)
 
 

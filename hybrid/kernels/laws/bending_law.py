@@ -438,6 +438,45 @@ def parts_without_spring(line, i, a, b):
 
 
 @inner
+def without_spring(line, i, x, y):
+    """Of the bend x, y (rad) of the element at an end what is not that of its angular spring."""
+    part = parts_without_spring(line, i, x, y)[0]
+    if part < RIGID and slips(line, i) and give_of_spring(line, i) > 0.0:  # which may bend another way than the spring
+        return beside_spring(line, i, x, y)
+    return part * x, part * y
+
+
+@inner
+def own_strain(line, i, k):
+    """Bends and twist, 1/m, of the element at node i of log strain k (rad), and its bends from what has no stress.
+
+    An angular spring at a clamp bends, but does not twist.
+    """
+    n, rest, one = line.h.shape[0], get3(line.k0, i), 1.0 / line.hn[i]
+    a, b, twist = k[0] - rest[0], k[1] - rest[1], k[2] * one
+    if i == 0 or i == n:
+        half = 0.5 * line.h[min(i, n - 1)]
+        twist *= line.hn[i] / half
+        if RIGID * line.hn[i] > half:
+            a, b = without_spring(line, i, a, b)
+            u, v, one = rest[0] + a, rest[1] + b, 1.0 / half
+            return u * one, v * one, twist, a * one, b * one
+    return k[0] * one, k[1] * one, twist, a * one, b * one
+
+
+@inner
+def elastic_moment(line, i, k):
+    """Bending moment, N m, of the elastic strain of the element at node i, two components."""
+    x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+    share = moment_share(line, i, math.sqrt(x * x + y * y))
+    mx, my = share * line.kb[i, 0] * x, share * line.kb[i, 1] * y
+    if slips(line, i):
+        a, b, _, _, _, _ = slip_answer(line, i, x, y)
+        return mx + a, my + b
+    return mx, my
+
+
+@inner
 def direction_of_bend(Ra, Rb, kb, k0):
     """Size of the bend (rad) and how it answers to the turn of the cells against each other, q: d size = q.dth."""
     if turns_freely(kb, k0):

@@ -8,13 +8,12 @@ from hybrid.kernels.algebra.plane import angle_between, chord2, end_chord, row_i
 from hybrid.kernels.algebra.rotations import frame, get3, get9
 from hybrid.kernels.laws.bending_law import (
     RIGID,
-    beside_spring,
     components_about_normal,
-    give_of_spring,
+    elastic_moment,
     moment_share,
+    own_strain,
     parts_without_spring,
     slip_about_normal,
-    slip_answer,
     slips,
 )
 from hybrid.kernels.laws.element import chord, strain_of_element
@@ -29,23 +28,9 @@ CLAMP = 20.0
 @inner
 def strain_of(line, T, i, k, strains):
     """Curvature (1/m), bending moment and torque (N m) of the element at node i, whose log strain is k (rad)."""
-    strains[i, 0] = math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[i]
-    x, y = line.kb[i, 0] * (k[0] - line.k0[i, 0]), line.kb[i, 1] * (k[1] - line.k0[i, 1])
-    bend = math.sqrt((k[0] - line.k0[i, 0]) ** 2 + (k[1] - line.k0[i, 1]) ** 2)
-    if i == 0 or i == line.h.shape[0]:
-        part = parts_without_spring(line, i, k[0] - line.k0[i, 0], k[1] - line.k0[i, 1])[0]
-        if part < RIGID:
-            a = line.k0[i, 0] + part * (k[0] - line.k0[i, 0])
-            b = line.k0[i, 1] + part * (k[1] - line.k0[i, 1])
-            if slips(line, i) and give_of_spring(line, i) > 0.0:  # which may bend another way than the spring
-                p, q = beside_spring(line, i, k[0] - line.k0[i, 0], k[1] - line.k0[i, 1])
-                a, b = line.k0[i, 0] + p, line.k0[i, 1] + q
-            strains[i, 0] = math.sqrt(a * a + b * b) / (0.5 * line.h[min(i, line.h.shape[0] - 1)])
-    strains[i, 1] = moment_share(line, i, bend) * math.sqrt(x * x + y * y)
-    if slips(line, i):
-        share = moment_share(line, i, bend)
-        mx, my, _, _, _, _ = slip_answer(line, i, k[0] - line.k0[i, 0], k[1] - line.k0[i, 1])
-        strains[i, 1] = math.sqrt((share * x + mx) ** 2 + (share * y + my) ** 2)
+    a, b, _, _, _ = own_strain(line, i, k)
+    mx, my = elastic_moment(line, i, k)
+    strains[i, 0], strains[i, 1] = math.sqrt(a * a + b * b), math.sqrt(mx * mx + my * my)
     strains[i, 2] = line.kb[i, 2] * (k[2] - rest_strain(line, T, i)[2])
 
 

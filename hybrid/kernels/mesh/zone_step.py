@@ -331,7 +331,7 @@ def find_shares(line, state, zones):
 def asks_layers(zones):
     """Whether what joints take of curvature counts as put back: curvature is asked, and no moment, on cells that stay.
 
-    Results put it back from the joint and the nodes beside it (outputs.strains), so rods are two cells wider, at least,
+    Results put it back from the joint and the nodes beside it (kernels.watch.sides), so rods are two cells wider, at least,
     than what asks for them.  A moment that a joint takes stays away.
     """
     return zones.asked[CURVATURE] > 0.0 and not zones.asked[MOMENT] > 0.0 and not zones.clock.share > 0.0

@@ -1,11 +1,9 @@
 """Extremes over all accepted steps at every node, also where cells change.
 
 They are of tension, curvature, moment, torque, contact force and displacement.  Where a quantity may have two values,
-at point loads and changes of section, the one on the right has a column of its own (books.right).  They follow the
-rules of the outputs (outputs.observation): tension of the middles of cells is interpolated to nodes, and taken on both
-sides of point loads and changes of section; at the ends it is the pull of what holds them.  A catenary has the
-curvature of the circle that two of its chords are tangents of; its ends, joints and marked nodes, where it may have a
-kink, have what its inner nodes lead to.
+at point loads and changes of section, the one on the right has a column of its own (books.right).  They are those of
+outputs (kernels.watch.sides): tension of the middles of cells is interpolated to nodes, and taken on both sides of
+point loads and changes of section; at the ends it is the pull of what holds them.
 
 Where cells change, those of nodes whose cells stay go on, all others are taken into those of the finest mesh.  Nodes
 are those of arc length s, (N+1,) m, before a change and to_s, (M+1,) m, after it; rods, (N,) and to_rods, (M,) tell
@@ -21,27 +19,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, log_rotation, scale, sub
-from hybrid.kernels.laws.bending_law import (
-    RIGID,
-    bending_at,
-    curvature_under,
-    damped_bending_at,
-    give_of_spring,
-    has_bend_law,
-    parts_without_spring,
-    slips,
-)
-from hybrid.kernels.laws.closed_forms import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
-from hybrid.kernels.laws.element import chord, frames_at, relative_rotation, strain_of_element, turning
+from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, scale, sub
+from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
+from hybrid.kernels.laws.element import chord, turning
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import bed_under, pressure
 from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.march.zone_torque import FIRST, LAST
-from hybrid.kernels.march.zone_torque import TORQUE as PASSED
 from hybrid.kernels.state.books import (
     CURVATURE,
     DISPLACEMENT,
@@ -53,11 +39,19 @@ from hybrid.kernels.state.books import (
     TENSION,
     TORQUE,
 )
-from hybrid.kernels.state.report import FORCE_A, OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.watch.soft_rods import BENT, Rods, bend_direction, of_chords, part_of_stiffness, restore_stiffness
-
-SAME_PLACE = 1e-9  # part of a length
+from hybrid.kernels.watch.sides import (
+    beside,
+    element_strain,
+    end_tension,
+    given_moment,
+    is_smooth,
+    passed_torque,
+    put_layers,
+    strain_on_side,
+)
+from hybrid.kernels.watch.soft_rods import BENT, Rods, restore_stiffness
 
 
 @kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation
@@ -75,65 +69,6 @@ def widen_both(extremes, right, what, i, x, t):
     widen(extremes, what, i, x, t)
     if right[i] != i:
         widen(extremes, what, right[i], x, t)
-
-
-@inner
-def beyond(T, h, near, far):
-    """Tension where cell `near` ends, from the middles of two neighbours."""
-    return T[near] + (T[near] - T[far]) * h[near] / (h[near] + h[far])
-
-
-@inner
-def beside(T, h, marks, i, side):
-    """Tension at node i as the cells on its side (-1, 1) lead to, up to the next kink."""
-    near = i - 1 if side < 0 else i
-    far = near + side
-    if not 0 <= far < h.shape[0] or marks[i + side]:
-        far = near
-    return beyond(T, h, near, far)
-
-
-@inner
-def second_cell(h, marks, k):
-    """The cell from which, beside that at end k, values at the end are extrapolated: none across a kink."""
-    n = h.shape[0]
-    first = k * (n - 1)
-    if n == 1 or marks[n - 1 if k else 1]:
-        return first
-    return first + 1 - 2 * k
-
-
-@inner
-def beyond_spring(t, d, line, ends, state, i):
-    """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring at node i turns."""
-    cosine = min(max(dot(t, d), -1.0), 1.0)
-    angle = math.acos(cosine)
-    x, y = angle, 0.0
-    if slips(line, i) and give_of_spring(line, i) > 0.0:
-        Ra, Rb = frames_at(line, ends, state, i)
-        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
-        x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
-    part = parts_without_spring(line, i, x, y)[0]
-    if part > RIGID or angle < 1e-6:
-        return t
-    return add(scale(math.sin(part * angle), t), scale(math.sin((1.0 - part) * angle), d))
-
-
-@inner
-def end_tension(line, ends, state, report, loaded, marks, k):
-    """Tension at an end: the force of what holds or loads it along the tangent; beside a body, that of the cable."""
-    n = line.h.shape[0]
-    first, second = k * (n - 1), second_cell(line.h, marks, k)
-    if loaded[k]:
-        return beyond(state.T, line.h, first, second)
-    d, _, _ = chord(get3(state.e, first))
-    d2, _, _ = chord(get3(state.e, second))
-    t = sub(scale(1.5, d), scale(0.5, d2))
-    if line.element[k * n]:
-        R = get9(ends.frame, k)
-        t = beyond_spring((R[2], R[5], R[8]), d, line, ends, state, k * n)
-    at = FORCE_A + 3 * k
-    return (1.0 - 2.0 * k) * dot((report[at], report[at + 1], report[at + 2]), t) / math.sqrt(dot(t, t))
 
 
 @inner
@@ -163,270 +98,58 @@ def moment_at(line, state, i):
 
 
 @inner
-def note_tension(line, ends, state, books, t):
+def tension_at(line, ends, state, books, i, side):
+    """Tension at node i, on its side (-1, 1) where it has two."""
     T, h, n = state.T, line.h, line.h.shape[0]
-    for k in range(2):
-        widen_both(
-            books.extremes,
-            books.right,
-            TENSION,
-            k * n,
-            end_tension(line, ends, state, books.report[0], books.loaded, books.marks, k),
-            t,
-        )
-    for i in range(1, n):
-        if books.marks[i]:
-            widen(books.extremes, TENSION, i, beside(T, h, books.marks, i, -1), t)
-            widen(books.extremes, TENSION, books.right[i], beside(T, h, books.marks, i, 1), t)
-        else:
-            widen_both(
-                books.extremes, books.right, TENSION, i, (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i]), t
-            )
-
-
-@inner
-def is_smooth(line, marks, i):
-    """Whether node i lies inside a catenary, away from loads and changes of section."""
-    n = line.h.shape[0]
-    return 0 < i < n and not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i]
-
-
-@inner
-def towards(line, state, marks, i, side):
-    """Curvature at what may be a kink, node i, as the nodes on its side (-1, 1) lead to."""
-    x = 0.0
-    if is_smooth(line, marks, i + side):
-        x = of_chords(line, state.e, i + side)
-        if is_smooth(line, marks, i + 2 * side) and is_smooth(line, marks, i + 3 * side):
-            there = of_chords(line, state.e, i + 2 * side)
-            far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
-            x = max(0.0, x + far * (x - there))
-    return x
-
-
-@inner
-def beside_kink(line, state, books, i, side):
-    """Curvature of a catenary at what may be a kink, node i, on its side: at a joint that which goes on there."""
-    n = line.h.shape[0]
-    if 0 < i < n and line.spin[i] != line.spin[i - 1]:
-        return books.strains[i, 0]
-    if (i == 0 or i == n) and is_hinge(line, books, 0 if i == 0 else 1):
-        return 0.0
-    return abs(towards(line, state, books.marks, i, side) + books.strains[i, BENT])
-
-
-@inner
-def note_catenary(line, state, books, i, t):
-    """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
-    if is_smooth(line, books.marks, i):
-        widen_both(books.extremes, books.right, CURVATURE, i, abs(books.strains[i, BENT]), t)
-        return
-    n = line.h.shape[0]
-    for side in (-1, 1):
-        cell = i - 1 if side < 0 else i
-        if cell < 0 or cell == n or line.spin[cell]:
-            continue
-        x = beside_kink(line, state, books, i, side)
-        widen(books.extremes, CURVATURE, i if side < 0 else books.right[i], x, t)
-
-
-@inner
-def with_layer(kappa, missing, along):
-    """Curvature kappa with what a joint takes of it, in a direction of cosine `along` to it; negative: against it."""
-    both = kappa + missing * along
-    return math.copysign(math.sqrt(both * both + missing * missing * (1.0 - min(along * along, 1.0))), both)
-
-
-@inner
-def goes_on(line, marks, j, way):
-    """Whether the rod goes on beyond node j, without a point load or another section."""
-    return not marks[j] and line.spin[min(j, j + way)] != 0
-
-
-@inner
-def layer_part(line, state, j, way, EI):
-    """f of the cell before node j of a rod; EI: N m2."""
-    T, h = state.T[min(j, j - way)], line.h[min(j, j - way)]
-    return fade(h * h * T / EI) if T > 0.0 and EI > 0.0 else 0.0
-
-
-@inner
-def stiffness_at(line, j):
-    """EI, N m2, of the element at node j."""
-    return line.kb[j, 0] * line.hn[j]
-
-
-@inner
-def is_hinge(line, books, k):
-    """Whether the curvature of a rod would fade to nothing at end k, where a catenary of two cells or more ends."""
-    n = line.h.shape[0]
-    return (
-        books.hinges[k, 0] > 0.0
-        and n > 1
-        and not line.spin[k * (n - 1)]
-        and is_smooth(line, books.marks, 1 + k * (n - 2))
-    )
-
-
-@inner
-def cut_layer_at_end(line, state, books, k):
-    """Take from strains[:, BENT] of a catenary the layer in which the curvature of a rod fades at its end k.
-
-    Where it may have a kink, at point loads, what is taken is there alone: the curvature follows from its neighbours.
-    """
-    n, EI, T, h = line.h.shape[0], books.hinges[k, 0], state.T, line.h
-    way, j = 1 - 2 * k, 1 + k * (n - 2)
-    end, direction = towards(line, state, books.marks, k * n, way), bend_direction(state.e, j)
-    first, depth = T[k * (n - 1)], 0.0
-    while 0 < j < n and T[min(j, j - way)] > 0.0 and not line.spin[min(j, j - way)] and first > 0.0:
-        depth += depth_of(T[min(j, j - way)], EI, h[min(j, j - way)])
-        part = left_of(depth, 0.5 * max(T[j - 1] + T[j], 0.0), first)
-        if part <= FADED or line.spin[j - 1] != line.spin[j]:
-            break
-        if is_smooth(line, books.marks, j):
-            along = dot(bend_direction(state.e, j), direction)
-            books.strains[j, BENT] = with_layer(books.strains[j, BENT], -end * part, along)
-        else:
-            books.strains[j, BENT] = -end * part
-        if not abs(line.s[j] - line.s[k * n]) < (1.0 - SAME_PLACE) * books.hinges[k, 1]:  # another stiffness
-            break
-        j += way
-
-
-@inner
-def put_layers_back(line, ends, state, books):
-    """Enter curvature as outputs have it (outputs.strains) into strains[:, BENT].
-
-    Of rods with what joints take of it, of catenaries without what fades at their ends.  At joints themselves that of
-    the side of the catenary into strains[:, 0].
-    """
-    n, bent = line.h.shape[0], books.strains
-    for i in range(n + 1):
-        bent[i, BENT] = bent[i, 0] if line.element[i] else 0.0
-        if is_smooth(line, books.marks, i):
-            bent[i, BENT] = of_chords(line, state.e, i)
-    for k in range(2):
-        if is_hinge(line, books, k):
-            cut_layer_at_end(line, state, books, k)
-    for i in range(1, n):
-        if line.spin[i] == line.spin[i - 1]:
-            continue
-        way = 1 if line.spin[i] else -1
-        own, _, _ = at_rod_end(line, ends, state, books, i, way, 0.0)
-        bent[i, 0], bent[i, BENT] = towards(line, state, books.marks, i, -way), own
-        j, outer = i + way, i - way
-        if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
-            continue
-        T, EI = state.T[min(j, i)], stiffness_at(line, j)
-        direction, part = bend_direction(state.e, outer), layer_part(line, state, j, way, EI)
-        before = stiffness_share(EI, T, line.hn[i], line.h[min(outer, i)])
-        after = stiffness_share(EI, T, line.hn[i], line.h[min(j, i)])
-        along = dot(bend_direction(state.e, j), direction)
-        turned = dot(bend_direction(state.e, i), direction)
-        there = at_hinge(of_chords(line, state.e, i), turned, of_chords(line, state.e, outer), before, after, part)
-        bent[i, 0], bent[i, BENT] = abs(there), with_layer(own, there, along)
-        for _ in range(FARTHEST):
-            if part <= FADED:
-                break
-            along = dot(bend_direction(state.e, j), direction)
-            bent[j, BENT] = with_layer(bent[j, BENT], there * part, along)
-            j += way
-            if not (0 < j < n and goes_on(line, books.marks, j, way)):
-                break
-            part *= layer_part(line, state, j, way, stiffness_at(line, j))
-
-
-@inner
-def cell_bend(line, ends, state, j):
-    """Curvature of the element at node j, 1/m."""
-    Ra, Rb = frames_at(line, ends, state, j)
-    k = log_rotation(relative_rotation(Ra, Rb))
-    return math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[j]
-
-
-@inner
-def at_rod_end(line, ends, state, books, i, side, passed):
-    """Curvature, moment and torque at node i, where the rod on its side (-1, 1) ends without element."""
-    n, cell = line.h.shape[0], i - 1 if side < 0 else i
-    d, _, _ = chord(get3(state.e, cell))
-    torque, moment = passed, 0.0
     if i == 0 or i == n:
-        m = scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
-        torque = dot(m, d)
-        across = add(m, scale(-torque, d))
-        moment = math.sqrt(dot(across, across))
-    j, curvature = i + side, 0.0
-    if line.element[j]:
-        curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
-        stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-        if slips(line, j):  # what a moment bends depends on the way
-            curvature = cell_bend(line, ends, state, j)
-        elif has_bend_law(line, j):
-            curvature += curvature_under(line, j, -side, moment)
-        elif stiffness > 0.0:
-            curvature += moment / (stiffness / part_of_stiffness(line, j, books.hinges))
-    return curvature, moment, torque
+        return end_tension(line, ends, state, books.report[0], books.loaded, books.marks, 0 if i == 0 else 1)
+    if not books.marks[i]:
+        return (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i])
+    return beside(T, h, books.marks, i, side)
 
 
 @inner
-def note_rod_end(line, ends, state, books, i, passed, t):
-    """Curvature, moment and torque where a rod has no element: those of the given moment.
+def has_one_value(line, books, i):
+    """Whether what is before node i is what is after it: no point load, change of section or joint."""
+    return books.right[i] == i and (line.element[i] or is_smooth(line, books.marks, i))
 
-    At a joint none but the torque `passed` of the zone beside it, N m.
-    Where the rod is curved without load and a moment is given, the curvature is the largest that both can have.
-    """
-    n = line.h.shape[0]
+
+@inner
+def load_on_side(line, ends, state, books, i, side, passed):
+    """Moment and torque (N m) on a side of node i; passed: torque of a zone there."""
+    if line.element[i]:
+        return books.strains[i, 1], books.strains[i, 2]
+    if not line.spin[min(i, i + side)]:
+        return 0.0, passed
+    m, d = given_moment(line, ends, i), chord(get3(state.e, min(i, i + side)))[0]
+    torque = dot(m, d)
+    across = sub(m, scale(torque, d))
+    return math.sqrt(dot(across, across)), torque + passed
+
+
+@inner
+def curvature_at(line, ends, state, books, i, side):
+    """Curvature, 1/m, on a side of node i: of most elements as it has been found."""
+    if line.element[i] and not books.marks[i] & SEAM:
+        return abs(books.strains[i, BENT])
+    k = element_strain(line, ends, state, i)
+    return abs(strain_on_side(line, ends, state, books, i, side, k, 0.0)[0])
+
+
+@inner
+def note_sides(line, ends, state, books, i, passed, t):
+    """Tension, curvature, moment and torque at a node, on each side that has values of its own."""
+    extremes, n, column = books.extremes, line.h.shape[0], books.right[i]
+    one = has_one_value(line, books, i)
     for side in (-1, 1):
-        cell = i - 1 if side < 0 else i
-        if cell < 0 or cell == n:
+        if not 0 <= i + side <= n or (side > 0 and i > 0 and one):
             continue
-        if not line.spin[cell]:
-            if books.right[i] != i:  # the catenary beside the rod has a value of its own there
-                widen(books.extremes, MOMENT, i if side < 0 else books.right[i], 0.0, t)
-                widen(books.extremes, TORQUE, i if side < 0 else books.right[i], passed, t)
-            continue
-        curvature, moment, torque = at_rod_end(line, ends, state, books, i, side, passed)
-        if 0 < i < n:
-            curvature = abs(books.strains[i, BENT])
-        at = i if side < 0 else books.right[i]
-        widen(books.extremes, CURVATURE, at, curvature, t)
-        widen(books.extremes, MOMENT, at, moment, t)
-        widen(books.extremes, TORQUE, at, torque, t)
-
-
-@inner
-def beside_seam(line, books, i, j):
-    """Curvature at the element of node i, where sections meet, on the side of its neighbour j."""
-    if slips(line, i):
-        return books.strains[i, 0]
-    if has_bend_law(line, i):
-        return curvature_under(line, i, j - i, books.strains[i, 1])
-    own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
-    stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-    x, bent, pieces = books.strains[i, 0], abs(books.strains[i, BENT]), books.hinges
-    if bent != x:  # of a rod with all of its stiffness
-        parts = part_of_stiffness(line, j, pieces) / part_of_stiffness(line, i, pieces) if line.element[j] else 1.0
-        x = bent * (own / stiffness * parts if line.element[j] and stiffness > 0.0 else 1.0)
-    elif line.element[j] and own > 0.0 and stiffness > 0.0:
-        x = max(0.0, x + books.strains[i, 1] * (1.0 / stiffness - 1.0 / own))
-    return x
-
-
-@inner
-def note_element(line, books, i, t):
-    """Curvature, moment and torque at an element; where sections meet, the curvature of both: the moment is one.
-
-    (Where the stiffness differs, and the cable is curved without load as well, the curvature of a side is the largest
-    that this can be.)
-    """
-    curvature, moment = abs(books.strains[i, BENT]), books.strains[i, 1]
-    widen_both(books.extremes, books.right, MOMENT, i, moment, t)
-    widen_both(books.extremes, books.right, TORQUE, i, books.strains[i, 2], t)
-    if not (books.marks[i] & SEAM):
-        widen_both(books.extremes, books.right, CURVATURE, i, curvature, t)
-        return
-    for j in (i - 1, i + 1):
-        widen(books.extremes, CURVATURE, i if j < i else books.right[i], beside_seam(line, books, i, j), t)
+        at = i if side < 0 else column
+        moment, torque = load_on_side(line, ends, state, books, i, side, passed)
+        widen(extremes, TENSION, at, tension_at(line, ends, state, books, i, side), t)
+        widen(extremes, CURVATURE, at, curvature_at(line, ends, state, books, i, side), t)
+        widen(extremes, MOMENT, at, moment, t)
+        widen(extremes, TORQUE, at, torque, t)
 
 
 @inner
@@ -440,58 +163,51 @@ def first_strains(line, ends, state, books):
 
 @inner
 def node_pressure(sea, state, i):
-    """Pressure of the bed at a node, N/m."""
+    """How deep a node lies below where contact begins, m, the rate of that, m/s, and the pressure of the bed there, N/m."""
     normal, p = bed_under(sea, get3(state.r, i))
     v = -dot(normal, get3(state.v, i))
-    return pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)[0]
+    return p, v, pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)[0]
+
+
+@inner
+def borne(h, i, before, here, after):
+    """Force per length, N/m, that node i bears of pressures at the nodes before, here and after, over its half cells.
+
+    It is what stands in the balance of the nodes, so that it has the weight of what lies still; the pressure itself
+    swings about that by up to a quarter beside an anchor and at the touchdown, where cells are longer than sqrt(T/k),
+    over which the bed takes up the line.
+    """
+    force = length = 0.0
+    if i > 0:
+        force, length = h[i - 1] * (before + 2.0 * here) / 6.0, 0.5 * h[i - 1]
+    if i < h.shape[0]:
+        force, length = force + h[i] * (2.0 * here + after) / 6.0, length + 0.5 * h[i]
+    return force / length
 
 
 @kernel
 def note_contact(line, sea, state, books, t):
-    """Force per length that the nodes bear, each over its half cells, as outputs have it."""
+    """Force per length that the nodes bear."""
     n = line.h.shape[0]
-    if line.bits & SOIL:
-        for i in range(n + 1):
-            widen_both(books.extremes, books.right, PRESSURE, i, state.soil[i, PRESSES], t)
-        return
-    here = node_pressure(sea, state, 0)
-    force = length = 0.0  # of the half cell before the node
+    before, here = 0.0, node_pressure(sea, state, 0)[2]
     for i in range(n + 1):
-        after = 0.0
-        if i < n:
-            after = node_pressure(sea, state, i + 1)
-            force += line.h[i] * (2.0 * here + after) / 6.0
-            length += 0.5 * line.h[i]
-        widen_both(books.extremes, books.right, PRESSURE, i, force / length, t)
-        if i < n:
-            force, length = line.h[i] * (here + 2.0 * after) / 6.0, 0.5 * line.h[i]
-        here = after
+        after = node_pressure(sea, state, i + 1)[2] if i < n else 0.0
+        pressed = state.soil[i, PRESSES] if line.bits & SOIL else borne(line.h, i, before, here, after)
+        widen_both(books.extremes, books.right, PRESSURE, i, pressed, t)
+        before, here = here, after
 
 
 @kernel  # once, for lines in a plane and in space, and for both places it is called from: 3 s less of compilation
 def note_extremes(line, sea, ends, state, books, t):
     """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
-    n = line.h.shape[0]
-    note_tension(line, ends, state, books, t)
-    put_layers_back(line, ends, state, books)
+    put_layers(line, ends, state, books)
     restore_stiffness(line, ends, Rods(state.e, state.T, books.strains, books.hinges, books.marks))
     if line.bits & SEABED:
         note_contact(line, sea, state, books, t)
-    zone, zones = 0, line.torsion.shape[0]
-    for i in range(n + 1):
-        passed = 0.0
-        if zone < zones and i >= line.torsion[zone, FIRST]:
-            passed = state.turn[zone, PASSED]
-            zone += i >= line.torsion[zone, LAST]
-        if line.element[i]:
-            note_element(line, books, i, t)
-        else:
-            note_catenary(line, state, books, i, t)
-            if line.spin[max(i - 1, 0)] or line.spin[min(i, n - 1)]:
-                note_rod_end(line, ends, state, books, i, passed, t)
-            else:
-                widen_both(books.extremes, books.right, MOMENT, i, 0.0, t)
-                widen_both(books.extremes, books.right, TORQUE, i, passed, t)
+    zone = 0
+    for i in range(line.h.shape[0] + 1):
+        passed, zone = passed_torque(line, state.turn, i, zone)
+        note_sides(line, ends, state, books, i, passed, t)
         if books.touch.shape[1] > 0:
             widen_both(books.extremes, books.right, SELF_PRESSURE, i, books.touch[0, i], t)
         if line.bits & OBSTACLES:

@@ -31,28 +31,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, log_rotation, scale, sub
-from hybrid.kernels.laws.bending_law import curvature_under, has_bend_law, parts_without_spring, slips
-from hybrid.kernels.laws.element import frames_at, relative_rotation, strain_of_element
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.seabed import bed_under
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.march.zone_torque import FIRST as FIRST_NODE
-from hybrid.kernels.march.zone_torque import LAST as LAST_NODE
-from hybrid.kernels.march.zone_torque import TORQUE as PASSED
-from hybrid.kernels.state.books import SEAM, VON_MISES, WALL_TENSION
+from hybrid.kernels.state.books import VON_MISES, WALL_TENSION
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.kernels.step.newton import RUN, read
-from hybrid.kernels.watch.extremes import (
-    BENT,
-    at_rod_end,
-    beside,
-    beside_kink,
-    beside_seam,
-    end_tension,
-    is_smooth,
-    widen,
-)
+from hybrid.kernels.watch.extremes import curvature_at, has_one_value, load_on_side, tension_at, widen
+from hybrid.kernels.watch.sides import element_strain, passed_torque, strain_on_side
 
 
 class Seen(NamedTuple):
@@ -77,82 +64,17 @@ WALL = 10
 
 
 @inner
-def tension_at(line, ends, state, books, i, side):
-    """Tension at node i, on its side (-1, 1) where it has two, as kernels.watch.extremes.note_tension has it."""
-    T, h, n = state.T, line.h, line.h.shape[0]
-    if i == 0 or i == n:
-        return end_tension(line, ends, state, books.report[0], books.loaded, books.marks, 0 if i == 0 else 1)
-    if not books.marks[i]:
-        return (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i])
-    return beside(T, h, books.marks, i, side)
+def bend_and_torque(line, ends, state, books, i, side, passed, natural):
+    """Curvature, 1/m, from what has no stress, and torque, N m, on a side of node i; natural: 1/m, without load.
 
-
-@inner
-def bend_and_torque(line, ends, state, books, i, side, passed):
-    """Curvature, 1/m, and torque, N m, at node i on its side; passed: N m, that a catenary there passes on."""
-    n = line.h.shape[0]
-    if line.element[i]:
-        curvature = abs(books.strains[i, BENT])
-        if books.marks[i] & SEAM:
-            curvature = beside_seam(line, books, i, i + side)
-        return curvature, books.strains[i, 2]
-    if is_smooth(line, books.marks, i):
-        return abs(books.strains[i, BENT]), passed
-    if i == 0 or i == n:
-        side = 1 if i == 0 else -1
-    if line.spin[i - 1 if side < 0 else i]:
-        curvature, _, torque = at_rod_end(line, ends, state, books, i, side, passed)
-        return abs(books.strains[i, BENT]) if 0 < i < n else curvature, torque
-    return beside_kink(line, state, books, i, side), passed
-
-
-@inner
-def bend_of_element(line, ends, state, i):
-    """Curvature, 1/m, of the element at node i from what has no stress."""
-    n = line.h.shape[0]
-    Ra, Rb = frames_at(line, ends, state, i)
-    k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
-    x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
-    bend = math.sqrt(x * x + y * y)
-    if i == 0 or i == n:
-        return parts_without_spring(line, i, x, y)[0] * bend / (0.5 * line.h[min(i, n - 1)])
-    return bend / line.hn[i]
-
-
-@inner
-def bend_at_seam(line, ends, state, books, i, side):
-    """The same of the element at node i, where sections meet, on its side: the moment is one."""
-    j = i + side
-    if has_bend_law(line, i):
-        return curvature_under(line, i, side, books.strains[i, 1])
-    if slips(line, i) or not (line.element[j] and line.kb[j, 0] > 0.0 and line.kb[j, 1] > 0.0):
-        return bend_of_element(line, ends, state, i)
-    Ra, Rb = frames_at(line, ends, state, i)
-    k = log_rotation(relative_rotation(Ra, Rb))
-    x = line.kb[i, 0] * (k[0] - line.k0[i, 0]) / line.kb[j, 0]
-    y = line.kb[i, 1] * (k[1] - line.k0[i, 1]) / line.kb[j, 1]
-    return math.sqrt(x * x + y * y) / line.hn[j]
-
-
-@inner
-def bend_and_torque_curved(line, ends, state, books, i, side, passed, natural):
-    """As `bend_and_torque`, where a section is curved without load: from what has no stress.
-
-    A catenary does not know which way its sections are curved: the most that both curvatures can make.
+    Where the way that sections are curved is not known, it is the most that both curvatures can make.
     """
-    curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed)
-    if line.element[i] and abs(books.strains[i, BENT]) == books.strains[i, 0]:  # no joint takes of it
-        if books.marks[i] & SEAM:
-            return bend_at_seam(line, ends, state, books, i, side), torque
-        return bend_of_element(line, ends, state, i), torque
-    n = line.h.shape[0]
-    if i == 0 or i == n:
-        j = 1 if i == 0 else n - 1
-        if line.spin[min(i, n - 1)] and line.element[j]:  # by the moment that is given there
-            if slips(line, j):
-                return bend_of_element(line, ends, state, j), torque
-            return curvature - math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j], torque
-    return curvature + natural, torque
+    torque = load_on_side(line, ends, state, books, i, side, passed)[1]
+    if not natural > 0.0:
+        return curvature_at(line, ends, state, books, i, side), torque
+    k = element_strain(line, ends, state, i)
+    x, _, a, b, unknown = strain_on_side(line, ends, state, books, i, side, k, passed)
+    return abs(x) + natural if unknown else math.sqrt(a * a + b * b), torque
 
 
 @inner
@@ -193,20 +115,16 @@ def largest_stress(wall, outside, inside, F, curvature, torque):
 def note_pipes(line, ends, state, books, t):
     """Widen the ranges of wall tension and stress to the state at time t (s)."""
     n, walls = line.h.shape[0], books.walls
-    zone, zones, section = 0, line.torsion.shape[0], 0
+    zone, section = 0, 0
     for i in range(n + 1):
-        passed = 0.0
-        if zone < zones and i >= line.torsion[zone, FIRST_NODE]:
-            passed = state.turn[zone, PASSED]
-            zone += i >= line.torsion[zone, LAST_NODE]
+        passed, zone = passed_torque(line, state.turn, i, zone)
         for side in (-1, 1):
             if side > 0:
                 while (
                     i < n and section + 1 < walls.shape[0] and line.s[i] + 0.5 * line.h[i] > walls[section, SECTION_END]
                 ):
                     section += 1
-                one = books.right[i] == i and (line.element[i] or is_smooth(line, books.marks, i))
-                if i == n or (i > 0 and one):
+                if i == n or (i > 0 and has_one_value(line, books, i)):
                     break
             elif i == 0:
                 continue
@@ -215,10 +133,7 @@ def note_pipes(line, ends, state, books, t):
             F = tension_of_wall(wall, outside, inside, tension_at(line, ends, state, books, i, side))
             stress = 0.0
             if wall[MODULUS] > 0.0:
-                if wall[NATURAL] > 0.0:
-                    curvature, torque = bend_and_torque_curved(line, ends, state, books, i, side, passed, wall[NATURAL])
-                else:
-                    curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed)
+                curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed, wall[NATURAL])
                 stress = largest_stress(wall, outside, inside, F, curvature, torque)
             widen(books.extremes, WALL_TENSION, column, F, t)
             widen(books.extremes, VON_MISES, column, stress, t)
@@ -294,15 +209,15 @@ def pull_at(seen, k):
 
 
 @inner
-def touch_at(seen, k):
+def touch_at(sea, s, r, k):
     """Arc length and place of the first point in contact from end k on; NaN: none."""
-    s, r, n = seen.s, seen.r, seen.e.shape[0]
+    n = s.shape[0] - 1
     step = 1 - 2 * k
     i = k * n
-    _, here = bed_under(seen.sea, get3(r, i))
+    _, here = bed_under(sea, get3(r, i))
     for _ in range(n):
         j = i + step
-        _, there = bed_under(seen.sea, get3(r, j))
+        _, there = bed_under(sea, get3(r, j))
         if max(here, there) > 0.0:
             x = 0.0
             if here <= 0.0:
@@ -456,7 +371,7 @@ def on_bed(seen, asked, reached, k, begins):
     if kind == LAYBACK and asked[TO_TOUCHDOWN] == 0.0:
         x = get3(seen.r, (1 - k) * seen.e.shape[0])
     else:
-        s, x = touch_at(seen, k)
+        s, x = touch_at(seen.sea, seen.s, seen.r, k)
         if kind == TOUCHDOWN:
             return s
     if kind == LAYBACK:

@@ -27,20 +27,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import cross, dot, get3
+from hybrid.kernels.algebra.rotations import add, dot, get3, get9, scale, sub
 from hybrid.kernels.laws.bending_law import EACH, FROM, KEPT, MOMENT, MOST, STIFF, STIFFENING, STIFFNESS
+from hybrid.kernels.laws.closed_forms import depth_of
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.seabed import interval, pressure
 from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
+from hybrid.kernels.march.resolution_checks import strain_of
 from hybrid.kernels.state.books import STRAINS
+from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import (
     ALONG_LINE,
     NO_TURN,
@@ -49,10 +52,23 @@ from hybrid.kernels.state.state import (
     Ends,
     Floats,
     Line,
+    Sea,
     blank_line,
     no_ends,
 )
-from hybrid.kernels.watch.soft_rods import BENT, EI, LINE, RAW, C, Rods, part_of_stiffness, restore_stiffness
+from hybrid.kernels.watch.extremes import borne, node_pressure
+from hybrid.kernels.watch.named_quantities import touch_at
+from hybrid.kernels.watch.sides import (
+    LAYER,
+    direction_on_side,
+    end_tension,
+    is_hinge,
+    more_twist,
+    passed_torque,
+    put_layers,
+    strain_on_side,
+)
+from hybrid.kernels.watch.soft_rods import Rods, bend_direction, of_chords, restore_stiffness
 
 # Points of a cell at which the bed presses, where its load on nodes is found.
 POINTS = 12
@@ -324,7 +340,28 @@ def put_largest(s, missed, points, rows, columns, out):
                     out[q, i, j] = max(out[q, i, j], abs(between(missed[q, n], c, part)))
 
 
-FOLDED = 1e-12  # 1 + cos(x) of cells that are as good as folded onto each other
+# Columns of what sides of nodes have.
+BEND = 0  # 3, curvature, 1/m
+TWIST = 3  # 1/m
+NATURAL = 4  # 2, bends from what has no stress, 1/m
+UNKNOWN = 6  # 1 where these are not known
+SIDE_TORQUE = 7  # N m
+ACROSS = 8  # 3, moment across the tangent, N m
+SIDE = 11
+# Columns of what the bed does to nodes.
+DEPTH = 0  # m, below where contact begins
+SINKING = 1  # m/s, its rate
+BORNE = 2  # N/m, what nodes bear
+ON_BED = 3
+# What touches the bed.
+EDGES = 0  # 2, arc lengths of the first and last point, m
+PLACES = 2  # 2 x 3, where they are, m
+GROUNDED = 8  # m, the length in contact
+TOUCH = 9
+# Cells of less depth: between their nodes the layer at an end of a catenary is straight to 0.1 %.
+SHALLOW = 0.1
+# Largest depth of a cell: beyond, nothing is left of a layer, and its exponential would be zero.
+STEEPEST = 700.0
 
 
 class Output(NamedTuple):
@@ -339,43 +376,35 @@ class Output(NamedTuple):
     w: Floats  # (N,) 1/s
     T: Floats  # (N,) N
     turn: Floats  # (K, 3) as `State.turn`
+    report: Floats  # as of a step
+    loaded: NDArray[np.int8]  # (2,) whether a load is at the end
+    hinges: Floats  # as of `Books`
+    marks: NDArray[np.int8]  # (N+1,) of nodes with two sides, as of `Books`
+    strains: Floats  # (N+1, STRAINS) as of `Books`
     moment: Floats  # (N+1, 3) N m, as of kernels.march.energies
     strain: Floats  # (N+1, 3) rad
     energy: Floats  # (5,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy)
     bend: Floats  # (N+1,) 1/m, from cell to cell, inside the line; empty: not asked for
-    hinges: Floats  # as of `Books`
-    marks: NDArray[np.int8]  # (N+1,) nodes with two sides
-    rods: Floats  # (N+1, STRAINS) as `Books.strains`, of kernels.watch.soft_rods; empty: not asked for
+    held: Floats  # (N+2,) N, tension at the start, of the cells, at the end
+    sides: Floats  # (n sides, SIDE)
+    bed: Floats  # (N+1, ON_BED)
+    touch: Floats  # (TOUCH,)
 
 
 def _blank() -> Output:
-    nodes, cells = np.zeros((2, 3)), np.zeros((1, 3))
+    z, nodes, cells, marks = np.zeros, np.zeros((2, 3)), np.zeros((1, 3)), np.zeros(2, np.int8)
     return Output(
-        blank_line(1),
-        no_ends(),
-        nodes,
-        cells,
-        nodes,
-        cells,
-        np.zeros(1),
-        np.zeros(1),
-        NO_TURN,
-        nodes,
-        nodes,
-        np.zeros(5),
-        np.zeros(2),
-        np.zeros((3, 3)),
-        np.zeros(2, np.int8),
-        np.zeros((2, STRAINS)),
-    )
+        blank_line(1), no_ends(), nodes, cells, nodes, cells, z(1), z(1), NO_TURN, z(1), marks, z((3, 3)), marks,
+        z((2, STRAINS)), nodes, nodes, z(5), z(2), z(3), z((2, SIDE)), z((2, ON_BED)), z(TOUCH),
+    )  # fmt: skip
 
 
 _read, _series = reader(_blank()), Series(_blank())
 
 
-@kernel
+@kernel(inlined=False)
 def observe_outputs(tables):
-    """Find moment, strain, energy and bend of all outputs, (nb, size) tables of `Output`."""
+    """Find moment, strain, energy, bend, held and sides of all outputs, (nb, size) tables of `Output`."""
     for k in range(tables.shape[0]):
         x = _read(tables[k])
         observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(x.moment, x.strain, x.energy))
@@ -383,28 +412,112 @@ def observe_outputs(tables):
         for i in range(x.r.shape[0]):
             for j in range(3):
                 high += x.line.force[i, j] * x.r[i, j]
+            if x.line.element[i]:
+                strain_of(x.line, x.T, i, get3(x.strain, i), x.strains)
         x.energy[4] = -high
-        if x.bend.shape[0] > 0:
-            before, _, _ = chord(get3(x.e, 0))
-            for i in range(1, x.e.shape[0]):
-                d, _, _ = chord(get3(x.e, i))
-                c = cross(before, d)
-                cosine = 1.0 + dot(before, d)
-                half = math.sqrt(dot(c, c)) / cosine if cosine > FOLDED else math.sqrt(2.0 / FOLDED)  # tan(x/2)
-                x.bend[i] = 2.0 * half / x.line.hn[i]
-                before = d
+        for i in range(1, min(x.bend.shape[0], x.e.shape[0])):
+            x.bend[i] = of_chords(x.line, x.e, i)
+        for i in range(x.T.shape[0]):
+            x.held[i + 1] = x.T[i]
+        for end in range(2):
+            at = end * (x.T.shape[0] + 1)
+            x.held[at] = end_tension(x.line, x.ends, x, x.report, x.loaded, x.marks, end)
+        put_layers(x.line, x.ends, x, x)
+        restore_stiffness(x.line, x.ends, Rods(x.e, x.T, x.strains, x.hinges, x.marks))
+        put_sides(x)
+
+
+@inner
+def put_sides(x):
+    """Enter what is on the sides of all nodes."""
+    n, row, zone = x.e.shape[0], 0, 0
+    for i in range(n + 1):
+        passed, zone = passed_torque(x.line, x.turn, i, zone)
+        for side in (-1, 1):
+            if 0 <= i + side <= n and (side > 0 or i == n or x.marks[i]):
+                put_side(x, row, i, side, passed)
+                row += 1
+
+
+@inner
+def put_side(x, row, i, side, passed):
+    """Enter what is on a side of node i into a row."""
+    line, d, out = x.line, chord(get3(x.e, min(i, i + side)))[0], x.sides[row]
+    outer, inward = i == 0 or i == x.e.shape[0], max(i - 1, 0)
+    tangent = d if outer else add(chord(get3(x.e, inward))[0], chord(get3(x.e, min(i, x.e.shape[0] - 1)))[0])
+    if outer and line.element[i]:
+        R = get9(x.ends.frame, 0 if i == 0 else 1)
+        tangent = (R[2], R[5], R[8])
+    tangent = scale(1.0 / max(math.sqrt(dot(tangent, tangent)), 1e-12), tangent)
+    M = get3(x.moment, i)
+    along = dot(M, tangent)
+    across = sub(M, scale(along, tangent))
+    kappa, twist, a, b, unknown = strain_on_side(line, x.ends, x, x, i, side, get3(x.strain, i), passed)
+    edge = outer or x.marks[i] != 0
+    if edge and line.spin[min(i, i + side)]:
+        twist -= more_twist(line, x.T, x.marks, i, side)
+    direction = direction_on_side(line, x.e, i, side, edge, across)
+    out[TWIST], out[NATURAL], out[NATURAL + 1], out[UNKNOWN] = twist, a, b, unknown
+    out[SIDE_TORQUE] = passed + (along if outer else x.strains[i, 2] if line.element[i] else 0.0)
+    for j in range(3):
+        out[BEND + j], out[ACROSS + j] = kappa * direction[j], across[j]
 
 
 @kernel
-def observe_soft_rods(tables):
-    """Find, of outputs that are observed, curvature of rods that lack stiffness (else NaN), and parts of it (column C)."""
+def observe_layers(tables, points, less):
+    """Curvature (nb, ns, 3), 1/m, by which layers at ends of catenaries are no straight lines between nodes.
+
+    points: (nb, ns) m, at which it is wanted.
+    """
     for k in range(tables.shape[0]):
         x = _read(tables[k])
-        for i in range(x.rods.shape[0]):
-            x.rods[i, RAW], x.rods[i, BENT] = math.hypot(x.strain[i, 0], x.strain[i, 1]) / x.line.hn[i], math.nan
-        restore_stiffness(x.line, x.ends, Rods(x.e, x.T, x.rods, x.hinges, x.marks))
-        for i in range(x.rods.shape[0]):
-            x.rods[i, C] = part_of_stiffness(x.line, i, x.hinges)
+        n, s = x.e.shape[0], x.line.s
+        for end in range(2):
+            one, i, way = x.strains[end * n, LAYER + end], end * n, 1 - 2 * end
+            if not is_hinge(x.line, x, end) or not one > 0.0:
+                continue
+            size, one, direction = one, 1.0, bend_direction(x.line, x.e, 1 + end * (n - 2))
+            while 0 < i + way < n and one > 0.0:
+                j = i + way
+                two = x.strains[j, LAYER + end]
+                deep = min(depth_of(x.T[min(i, j)], x.hinges[end, 0], x.line.h[min(i, j)]), STEEPEST)
+                for p in range(points.shape[1] if deep > SHALLOW else 0):
+                    u = (points[k, p] - s[i]) / (s[j] - s[i])
+                    if 0.0 < u < 1.0:
+                        here = one * (math.exp(-u * deep) - u * math.exp(-deep))  # to nothing where it no longer counts
+                        if two > 0.0:
+                            here = one ** (1.0 - u) * two**u
+                        for m in range(3):
+                            less[k, p, m] += ((1.0 - u) * one + u * two - here) * size * direction[m]
+                i, one = j, two
+
+
+@inner
+def part_that_lies(a, b):
+    """Part of a cell that is in contact; a, b: depths of its nodes, m."""
+    high, low = max(a, b), min(a, b)
+    return 0.0 if high <= 0.0 else 1.0 if low > 0.0 else high / (high - low)
+
+
+@kernel
+def observe_bed(tables, sea):
+    """Find `bed` and `touch` of all outputs."""
+    for k in range(tables.shape[0]):
+        x = _read(tables[k])
+        n, s, bed = x.e.shape[0], x.line.s, x.bed
+        before, here, x.touch[GROUNDED] = 0.0, 0.0, 0.0
+        bed[0, DEPTH], bed[0, SINKING], here = node_pressure(sea, x, 0)
+        for i in range(n + 1):
+            after = 0.0
+            if i < n:
+                bed[i + 1, DEPTH], bed[i + 1, SINKING], after = node_pressure(sea, x, i + 1)
+                x.touch[GROUNDED] += (s[i + 1] - s[i]) * part_that_lies(bed[i, DEPTH], bed[i + 1, DEPTH])
+            bed[i, BORNE] = borne(x.line.h, i, before, here, after)
+            before, here = here, after
+        for end in range(2):
+            x.touch[EDGES + end], place = touch_at(sea, s, x.r, end)
+            for j in range(3):
+                x.touch[PLACES + 3 * end + j] = place[j]
 
 
 def slipped(line: Line, batch: Batch) -> Floats:
@@ -420,6 +533,15 @@ def slipped(line: Line, batch: Batch) -> Floats:
     return out
 
 
+class Along(NamedTuple):
+    """What outputs have along their lines, beside the lines."""
+
+    hinges: Floats  # as of `Books`
+    loaded: NDArray[np.int8]  # (2,)
+    marks: NDArray[np.int8]  # of all nodes
+    sides: int  # of all nodes: how many
+
+
 class Found(NamedTuple):
     """What is found of nb outputs, one behind the other where their lines are others."""
 
@@ -427,29 +549,43 @@ class Found(NamedTuple):
     strain: Floats  # (nb, N+1, 3) rad
     energy: Floats  # (nb, 5) J
     bend: Floats  # (nb, N+1) 1/m; of rod alone (nb, 0)
-    rods: Floats  # (nb, N+1, STRAINS) as of `observe_soft_rods`; (nb, 0, STRAINS): no rods, or nothing known of them
+    held: Floats  # (nb, N+2) N
+    sides: Floats  # (nb, n sides, SIDE)
+    bed: Floats  # (nb, N+1, ON_BED); without a bed (nb, 0, ON_BED)
+    touch: Floats  # (nb, TOUCH)
+    tables: NDArray[np.int64]
+    kept: tuple[Any, ...]  # what their addresses are of
+
+    def layers(self, points: Floats) -> Floats:
+        """As of `observe_layers` at points (nb, ns) m."""
+        less = np.zeros((*points.shape, 3))
+        observe_layers(self.tables, np.ascontiguousarray(points), less)
+        return less
+
+
+def _find(found: Found, line: Line, sea: Sea) -> Found:
+    observe_outputs(found.tables)
+    if line.bits & SEABED:
+        observe_bed(found.tables, sea)
+    return found
 
 
 def observed(
-    line: Line,
-    batch: Batch,
-    hinges: Floats,
-    marks: NDArray[np.int8],
-    varied: Mapping[str, Floats] = MappingProxyType({}),
+    line: Line, sea: Sea, batch: Batch, what: Along, varied: Mapping[str, Floats] = MappingProxyType({})
 ) -> Found:
-    """What outputs of one line mean.
+    """What outputs of one line mean; varied: arrays (nb, ...) of the line by name, where it is another one in every output.
 
-    hinges: as of `Books`; marks: (N+1,) nodes with two sides; varied: arrays (nb, ...) of the line by name, where it is another one in every output.
     A bend is 2 tan(x/2) over the length of line around the node, x the angle from cell to cell; zero at the ends.
     """
     nb, n = batch.T.shape
-    rods, catenary = bool(line.element.any() or line.spin.any()), not line.spin.all()
+    rods, catenary, touches = bool(line.element.any() or line.spin.any()), not line.spin.all(), line.bits & SEABED
     moment, strain = (np.zeros((nb if rods else 1, n + 1, 3)) for _ in range(2))
-    energy, bend = np.zeros((nb, 5)), np.zeros((nb, n + 1 if catenary else 0))
-    soft = rods and hinges[LINE, EI] > 0.0
-    whole = np.zeros((nb, n + 1 if soft else 0, STRAINS))
-    own = {"moment": moment, "strain": strain} if rods else {}
-    state = {"r": batch.r, "e": batch.e, "v": batch.v, "a1": batch.a1, "w": batch.w, "T": batch.T}
+    z = np.zeros
+    out = {"energy": z((nb, 5)), "bend": z((nb, n + 1 if catenary else 0)), "held": z((nb, n + 2))}
+    out |= {"bed": z((nb, n + 1 if touches else 0, ON_BED)), "touch": z((nb, TOUCH))}
+    out |= {"sides": z((nb, what.sides, SIDE)), "strains": z((nb, n + 1, STRAINS))}
+    own = out | ({"moment": moment, "strain": strain} if rods else {})
+    state = {name: getattr(batch, name) for name in ("r", "e", "v", "a1", "w", "T", "report")}
     if batch.turn.size:
         state["turn"] = batch.turn
     held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
@@ -458,58 +594,47 @@ def observed(
         varied = {**varied, "slip_now": slipped(line, batch)}
     of_line |= {f"line.{name}": x for name, x in varied.items()}
     there = batch.line(0, line)._replace(**{name: x[0] for name, x in varied.items()})
+    along = state | own
+    given = {"turn": NO_TURN, "moment": moment[0], "strain": strain[0]} | {name: x[0] for name, x in along.items()}
     first = Output(
-        there, Ends(*(x[0] for x in held)),
-        **{"turn": NO_TURN} | {name: x[0] for name, x in state.items()}, moment=moment[0], strain=strain[0],
-        energy=energy[0], bend=bend[0], hinges=hinges, marks=marks, rods=whole[0],
-    )  # fmt: skip
-    along = (
-        state
-        | own
-        | of_line
-        | {"energy": energy, "bend": bend, "rods": whole}
-        | {f"ends.{name}": x for name, x in held._asdict().items()}
+        there, Ends(*(x[0] for x in held)), hinges=what.hinges, marks=what.marks, loaded=what.loaded, **given
     )
-    tables = _series(first, nb, along)
-    observe_outputs(tables)
-    if soft:
-        observe_soft_rods(tables)
-    return Found(moment, strain, energy, bend, whole)
+    ends = {f"ends.{name}": x for name, x in held._asdict().items()}
+    tables = _series(first, nb, along | of_line | ends)
+    kept = {name: x for name, x in out.items() if name != "strains"}
+    return _find(Found(moment, strain, **kept, tables=tables, kept=(first, along, of_line, held)), line, sea)
 
 
 def observed_joined(
-    line: Line, batch: Batch, hinges: Floats, marks: NDArray[np.int8], begin: NDArray[np.int64]
+    line: Line, sea: Sea, batch: Batch, what: Along, begin: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> Found:
     """The same of nb outputs of other lines, one behind the other: of nodes (M, ...) in place of (nb, N+1, ...).
 
-    begin: (nb+1,) nodes before each line; line, batch: arrays along all of them, in `batch` with one row; between two
-    lines is a cell that belongs to none.  Without catenary there are no bends, (0,).
+    begin, rows: (nb+1,) nodes and sides before each line; line, batch: arrays along all of them, in `batch` with one row;
+    between two lines is a cell that belongs to none.  Without catenary there are no bends, (0,).
     """
-    nodes, catenary = int(begin[1]), not line.spin.all()
-    moment, strain = np.zeros((begin[-1], 3)), np.zeros((begin[-1], 3))
-    energy, bend = np.zeros((begin.size - 1, 5)), np.zeros(begin[-1] if catenary else 0)
-    soft = line.spin.any() and hinges[LINE, EI] > 0.0
-    whole = np.zeros((begin[-1] if soft else 0, STRAINS))
-    on_nodes = {"r": batch.r[0], "v": batch.v[0], "moment": moment, "strain": strain, "marks": marks}
-    on_nodes |= ({"bend": bend} if catenary else {}) | ({"rods": whole} if soft else {})
+    nodes, M, catenary, touches = int(begin[1]), begin[-1], not line.spin.all(), line.bits & SEABED
+    z, nb = np.zeros, begin.size - 1
+    each = {"energy": z((nb, 5)), "touch": z((nb, TOUCH))}
+    found = {"moment": z((M, 3)), "strain": z((M, 3)), "bend": z(M if catenary else 0)}
+    found |= {"bed": z((M if touches else 0, ON_BED)), "held": z(M + nb), "sides": z((rows[-1], SIDE))}
+    on_nodes = {"r": batch.r[0], "v": batch.v[0], "marks": what.marks, "strains": np.zeros((M, STRAINS))}
+    on_nodes |= {name: found[name] for name in ("moment", "strain", "bend", "bed") if len(found[name])}
     on_nodes |= {f"line.{name}": getattr(line, name) for name in NODES_OF_LINE}
     on_cells = {name: getattr(batch, name)[0] for name in ("e", "a1", "w", "T")}
     on_cells |= {f"line.{name}": getattr(line, name) for name in ALONG_LINE if name not in NODES_OF_LINE}
     cut = {name: x[:nodes] for name, x in on_nodes.items()} | {name: x[: nodes - 1] for name, x in on_cells.items()}
     held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
-    own = {name: x for name, x in cut.items() if "." not in name}
+    own = found | {name: x for name, x in cut.items() if "." not in name} | {name: x[0] for name, x in each.items()}
+    own |= {"held": found["held"][: nodes + 1], "sides": found["sides"][: rows[1]], "report": batch.report[0]}
     first = Output(
-        line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}),
-        Ends(*(x[0] for x in held)),
-        **{"turn": NO_TURN, "bend": bend, "rods": whole} | own,
-        energy=energy[0],
-        hinges=hinges,
-    )
-    along = {"energy": energy} | {f"ends.{name}": x for name, x in held._asdict().items()}
-    tables = _series(first, energy.shape[0], along)
+        line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}), Ends(*(x[0] for x in held)), turn=NO_TURN,
+        hinges=what.hinges, loaded=what.loaded, **own,
+    )  # fmt: skip
+    along = each | {"report": batch.report} | {f"ends.{name}": x for name, x in held._asdict().items()}
+    tables = _series(first, nb, along)
     _series.shift(tables, on_nodes, begin[:-1], np.diff(begin))
     _series.shift(tables, on_cells, begin[:-1], np.diff(begin) - 1)
-    observe_outputs(tables)
-    if soft:
-        observe_soft_rods(tables)
-    return Found(moment, strain, energy, bend, whole)
+    _series.shift(tables, {"held": found["held"]}, begin[:-1] + np.arange(nb), np.diff(begin) + 1)
+    _series.shift(tables, {"sides": found["sides"]}, rows[:-1], np.diff(rows))
+    return _find(Found(**found, **each, tables=tables, kept=(first, on_nodes, on_cells, held)), line, sea)

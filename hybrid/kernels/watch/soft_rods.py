@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale
 from hybrid.kernels.laws.element import chord
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Floats
 
 # Columns of books.strains.
@@ -43,6 +44,7 @@ D = 5
 WHOLE = 1.0 - 1e-9  # p from which on a rod has all of its stiffness
 LINE = 2  # first row of books.hinges of pieces of the line
 EI, END, GJ = range(3)  # columns of these
+FOLDED = 1e-12  # 1 + cos(x) of cells that are as good as folded onto each other
 SLACK = 2.5e-5  # least h T/K, for lines with hardly any tension: M fades within some 200 cells
 
 
@@ -61,8 +63,9 @@ def of_chords(line, e, i):
     """Curvature, 1/m, at node i of the circle that its two chords are tangents of."""
     d, _, _ = chord(get3(e, i - 1))
     dn, _, _ = chord(get3(e, i))
-    s = cross(d, dn)
-    return 2.0 * math.sqrt(dot(s, s)) / (max(1.0 + dot(d, dn), 1e-12) * line.hn[i])
+    s, cosine = cross(d, dn), 1.0 + dot(d, dn)
+    half = math.sqrt(dot(s, s)) / cosine if cosine > FOLDED else math.sqrt(2.0 / FOLDED)  # tan(x/2)
+    return 2.0 * half / line.hn[i]
 
 
 @inner
@@ -73,10 +76,14 @@ def across(a, b):
     return scale(1.0 / length, x) if length > 0.0 else (0.0, 1.0, 0.0)
 
 
-@inner
-def bend_direction(e, i):
-    """Direction across both chords at inner node i."""
-    return across(chord(get3(e, i - 1))[0], chord(get3(e, i))[0])
+@called
+def bend_direction(line, e, i):
+    """Direction across both chords at inner node i; of a line in a plane its normal, or against it."""
+    a, b = chord(get3(e, i - 1))[0], chord(get3(e, i))[0]
+    if line.bits & PLANAR:
+        normal = get3(line.plane, 2)
+        return normal if dot(normal, cross(a, b)) >= 0.0 else scale(-1.0, normal)
+    return across(a, b)
 
 
 @inner
@@ -85,7 +92,7 @@ def bend_at(line, ends, rods, i):
     n = line.h.shape[0]
     if 0 < i < n:
         size = rods.strains[i, RAW] if line.element[i] else of_chords(line, rods.e, i)
-        return scale(size, bend_direction(rods.e, i))
+        return scale(size, bend_direction(line, rods.e, i))
     if not line.element[i]:
         return (0.0, 0.0, 0.0)
     R, d = get9(ends.frame, 0 if i == 0 else 1), chord(get3(rods.e, min(i, n - 1)))[0]
@@ -154,7 +161,9 @@ def balance(line, ends, rods, i, a, b):
     if not inside and 0 < outer < n and goes_on_outside(line, rods.marks, outer):
         cell = 1.0 / h[min(i, outer)]
         diagonal += cell
-        rhs = add(rhs, scale(K * line.hn[i] * cell * of_chords(line, rods.e, outer), bend_direction(rods.e, outer)))
+        rhs = add(
+            rhs, scale(K * line.hn[i] * cell * of_chords(line, rods.e, outer), bend_direction(line, rods.e, outer))
+        )
     return diagonal, rhs
 
 

@@ -1,0 +1,394 @@
+"""What a line has on both sides of its nodes: tension at its ends, curvature, twist, torque; of steps and of outputs.
+
+Rods have curvature by their elements, catenaries that of the circle that two of their chords are tangents of.  Where no
+element sits it follows from the moment that is given there; where sections meet the moment is one; at what may be a
+kink of a catenary it is what the nodes inside lead to.  Rods have what joints take of it, catenaries have not what
+fades at their ends (kernels.laws.closed_forms).  Its sign says whether it is against the bend that was computed.
+
+    symbol   meaning                                                               unit
+    k        log strain of the element at a node (laws.element)                    rad
+    M        moment that is given at an end; of its element                        N m
+    i, side  node, and the side of it, -1 or 1; j the next node on that side
+    passed   torque that a catenary passes on at a node                            N m
+
+A state has e, T, a1 (and v, w where stiffness damps), books have strains, marks and hinges: those of a run, or an output.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub
+from hybrid.kernels.laws.bending_law import (
+    RIGID,
+    curvature_under,
+    elastic_moment,
+    give_of_spring,
+    has_bend_law,
+    own_strain,
+    parts_without_spring,
+    slips,
+)
+from hybrid.kernels.laws.closed_forms import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
+from hybrid.kernels.laws.element import chord, frames_at, strain_of_element
+from hybrid.kernels.laws.tension_torque import couples, rest_strain
+from hybrid.kernels.machine.compile import called, inner
+from hybrid.kernels.march.zone_torque import FIRST, LAST, TORQUE
+from hybrid.kernels.state.books import SEAM
+from hybrid.kernels.state.report import FORCE_A
+from hybrid.kernels.watch.soft_rods import BENT, RAW, bend_direction, of_chords, part_of_stiffness
+
+SAME_PLACE = 1e-9  # part of a length
+SAME = 1e-12  # part of a curvature: round-off
+# First of two columns of books.strains that elements use: at nodes of catenaries the part that is left of the layer at
+# either end, at that end its curvature, 1/m.
+LAYER = 1
+
+
+@inner
+def beyond(T, h, near, far):
+    """Tension where cell `near` ends, from the middles of two neighbours."""
+    return T[near] + (T[near] - T[far]) * h[near] / (h[near] + h[far])
+
+
+@inner
+def beside(T, h, marks, i, side):
+    """Tension at node i as the cells on its side (-1, 1) lead to, up to the next kink."""
+    near = i - 1 if side < 0 else i
+    far = near + side
+    if not 0 <= far < h.shape[0] or marks[i + side]:
+        far = near
+    return beyond(T, h, near, far)
+
+
+@inner
+def second_cell(h, marks, k):
+    """The cell from which, beside that at end k, values at the end are extrapolated: none across a kink."""
+    n = h.shape[0]
+    first = k * (n - 1)
+    if n == 1 or marks[n - 1 if k else 1]:
+        return first
+    return first + 1 - 2 * k
+
+
+@inner
+def beyond_spring(t, d, line, ends, state, i):
+    """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring at node i turns."""
+    cosine = min(max(dot(t, d), -1.0), 1.0)
+    angle = math.acos(cosine)
+    x, y = angle, 0.0
+    if slips(line, i) and give_of_spring(line, i) > 0.0:
+        Ra, Rb = frames_at(line, ends, state, i)
+        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+        x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+    part = parts_without_spring(line, i, x, y)[0]
+    if part > RIGID or angle < 1e-6:
+        return t
+    return add(scale(math.sin(part * angle), t), scale(math.sin((1.0 - part) * angle), d))
+
+
+@called
+def end_tension(line, ends, state, report, loaded, marks, k):
+    """Tension at an end: the force of what holds or loads it along the tangent; beside a body, that of the cable."""
+    n = line.h.shape[0]
+    first, second = k * (n - 1), second_cell(line.h, marks, k)
+    if loaded[k]:
+        return beyond(state.T, line.h, first, second)
+    d, _, _ = chord(get3(state.e, first))
+    d2, _, _ = chord(get3(state.e, second))
+    t = sub(scale(1.5, d), scale(0.5, d2))
+    if line.element[k * n]:
+        R = get9(ends.frame, k)
+        t = beyond_spring((R[2], R[5], R[8]), d, line, ends, state, k * n)
+    at = FORCE_A + 3 * k
+    return (1.0 - 2.0 * k) * dot((report[at], report[at + 1], report[at + 2]), t) / math.sqrt(dot(t, t))
+
+
+@inner
+def is_smooth(line, marks, i):
+    """Whether node i lies inside a catenary, away from loads and changes of section."""
+    n = line.h.shape[0]
+    return 0 < i < n and not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i]
+
+
+@called
+def towards(line, state, marks, i, side):
+    """Curvature at what may be a kink, node i, as the nodes on its side (-1, 1) lead to."""
+    x = 0.0
+    if is_smooth(line, marks, i + side):
+        x = of_chords(line, state.e, i + side)
+        if is_smooth(line, marks, i + 2 * side) and is_smooth(line, marks, i + 3 * side):
+            there = of_chords(line, state.e, i + 2 * side)
+            far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
+            x = max(0.0, x + far * (x - there))
+    return x
+
+
+@inner
+def passed_torque(line, turn, i, zone):
+    """`passed` at node i, and the zone to ask for at the next one; zone: that of node i or the first behind it."""
+    if zone < turn.shape[0] and i >= line.torsion[zone, FIRST]:
+        return turn[zone, TORQUE], zone + (i >= line.torsion[zone, LAST])
+    return 0.0, zone
+
+
+@inner
+def element_strain(line, ends, state, i):
+    """k of the element at node i; nothing where there is none."""
+    if not line.element[i]:
+        return (0.0, 0.0, 0.0)
+    Ra, Rb = frames_at(line, ends, state, i)
+    return strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+
+
+@inner
+def given_moment(line, ends, i):
+    """M that is given at an end of a rod without an element; inside the line nothing."""
+    n = line.h.shape[0]
+    if (i > 0 and i < n) or not line.spin[min(i, n - 1)]:
+        return (0.0, 0.0, 0.0)
+    return scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
+
+
+@inner
+def more_twist(line, T, marks, i, side):
+    """Twist, 1/m, by which tension turns the middle of the cell on a side of an edge more than the node."""
+    j, c = i + side, min(i, i + side)
+    if not couples(line) or j == 0 or j == line.h.shape[0] or marks[j] or not line.spin[c + side]:
+        return 0.0
+    h, d = line.h, c + side
+    return 2.0 * line.tension_twist[c] / h[c] * (T[c] - T[d]) * (h[c] / (h[c] + h[d]))
+
+
+@called
+def strain_of_moment(line, ends, state, hinges, i, side, k, passed):
+    """The same of the rod on a side of node i from its moment: by the element there, or as it is given.
+
+    Twist is that of torque and tension; where layers slip it depends on the way, and bends are those of node j.
+    """
+    j, c = i + side, min(i, i + side)
+    if not line.element[j]:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    if line.element[i]:
+        mx, my = elastic_moment(line, i, k)
+        torque, law, beside = line.kb[i, 2] * (k[2] - rest_strain(line, state.T, i)[2]), i, side
+    else:
+        d, a, M = chord(get3(state.e, c))[0], get3(state.a1, c), given_moment(line, ends, i)
+        mx, my, torque = dot(a, M), dot(cross(d, a), M), dot(d, M) + passed
+        law, beside = j, -side
+    hn, rest = line.hn[j], get3(line.k0, j)
+    a, b, twist = 0.0, 0.0, rest[2] / hn
+    if line.kb[j, 2] > 0.0:
+        twist += torque / (line.kb[j, 2] * hn)
+    if couples(line):
+        twist -= 2.0 * line.tension_twist[c] / line.h[c] * state.T[c]
+    if slips(line, j):
+        x = sub(element_strain(line, ends, state, j), rest)
+        a, b = x[0] / hn, x[1] / hn
+    elif has_bend_law(line, law):
+        size = math.sqrt(mx * mx + my * my)
+        part = curvature_under(line, law, beside, size) / size if size > 0.0 else 0.0
+        a, b = part * mx, part * my
+    else:
+        part = part_of_stiffness(line, j, hinges) / hn
+        a = part * mx / line.kb[j, 0] if line.kb[j, 0] > 0.0 else 0.0
+        b = part * my / line.kb[j, 1] if line.kb[j, 1] > 0.0 else 0.0
+    return rest[0] / hn + a, rest[1] / hn + b, twist, a, b
+
+
+@inner
+def is_jump(line, marks, i, side):
+    """Whether sections meet at the element of node i, whose moment is one: its strain on a side is not its own."""
+    return marks[i] & SEAM and line.element[i] and line.element[i + side] and not slips(line, i)
+
+
+@inner
+def rod_strain(line, ends, state, books, i, side, k, passed):
+    """Bends and twist, 1/m, of the rod on a side of node i without layers, and its bends from what has no stress."""
+    if line.element[i] and not is_jump(line, books.marks, i, side):
+        return own_strain(line, i, k)
+    return strain_of_moment(line, ends, state, books.hinges, i, side, k, passed)
+
+
+@inner
+def rod_curvature(line, books, i, side, plain):
+    """Curvature, 1/m, that results have of the rod on a side of node i; plain: its size without layers.
+
+    Where sections meet that of a rod with all of its stiffness is of one moment, too.
+    """
+    bent, raw, j = books.strains[i, BENT], books.strains[i, RAW], i + side
+    if not line.element[i]:
+        return plain if i == 0 or i == line.h.shape[0] else bent
+    if not (books.marks[i] & SEAM) or not line.element[j]:
+        return bent
+    if bent == raw:
+        return plain
+    parts = part_of_stiffness(line, j, books.hinges) / part_of_stiffness(line, i, books.hinges)
+    beside = line.kb[j, 0] * line.hn[j]
+    return bent * (line.kb[i, 0] * line.hn[i] / beside * parts if beside > 0.0 else 1.0)
+
+
+@inner
+def is_touched(line, books, i, plain):
+    """Whether a joint takes a part of the curvature of a rod at node i, or its element lacks stiffness."""
+    if line.element[i]:
+        return books.strains[i, BENT] != books.strains[i, RAW]
+    return 0 < i < line.h.shape[0] and abs(abs(books.strains[i, BENT]) - plain) > SAME * plain
+
+
+@inner
+def catenary_curvature(line, state, books, i, side):
+    """Curvature of the catenary on a side of node i: at a joint that which goes on there, less what fades at ends."""
+    n, strains = line.h.shape[0], books.strains
+    if is_smooth(line, books.marks, i):
+        x, j = strains[i, BENT], i
+    elif (i == 0 or i == n) and strains[i, LAYER] + strains[i, LAYER + 1] > 0.0:
+        return 0.0
+    else:
+        x, j = towards(line, state, books.marks, i, side), min(max(i + side, 1), n - 1)
+        if 0 < i < n and line.spin[i] != line.spin[i - 1]:
+            x = strains[i, RAW]
+    for end in range(2):
+        part = strains[i, LAYER + end]
+        if part > 0.0:
+            direction = bend_direction(line, state.e, 1 + end * (n - 2))
+            along = dot(bend_direction(line, state.e, j), direction)
+            x = with_layer(x, -part * strains[end * n, LAYER + end], along)
+    return x
+
+
+@called
+def strain_on_side(line, ends, state, books, i, side, k, passed):
+    """Curvature and twist, 1/m, on a side of node i, bends from what has no stress, and whether these are unknown.
+
+    Those of catenaries are, which do not know which way their sections are curved.
+    """
+    if not line.spin[min(i, i + side)]:
+        return catenary_curvature(line, state, books, i, side), 0.0, 0.0, 0.0, True
+    x, y, twist, a, b = rod_strain(line, ends, state, books, i, side, k, passed)
+    plain = math.sqrt(x * x + y * y)
+    return rod_curvature(line, books, i, side, plain), twist, a, b, is_touched(line, books, i, plain)
+
+
+@inner
+def with_layer(kappa, missing, along):
+    """Curvature kappa with what a joint takes of it, in a direction of cosine `along` to it; negative: against it."""
+    both = kappa + missing * along
+    return math.copysign(math.sqrt(both * both + missing * missing * (1.0 - min(along * along, 1.0))), both)
+
+
+@inner
+def goes_on(line, marks, j, way):
+    """Whether the rod goes on beyond node j, without a point load or another section."""
+    return not marks[j] and line.spin[min(j, j + way)] != 0
+
+
+@inner
+def layer_part(line, state, j, way, EI):
+    """f of the cell before node j of a rod; EI: N m2."""
+    T, h = state.T[min(j, j - way)], line.h[min(j, j - way)]
+    return fade(h * h * T / EI) if T > 0.0 and EI > 0.0 else 0.0
+
+
+@inner
+def stiffness_at(line, j):
+    """EI, N m2, of the element at node j."""
+    return line.kb[j, 0] * line.hn[j]
+
+
+@inner
+def is_hinge(line, books, k):
+    """Whether the curvature of a rod would fade to nothing at end k, where a catenary of two cells or more ends."""
+    n = line.h.shape[0]
+    return (
+        books.hinges[k, 0] > 0.0
+        and n > 1
+        and not line.spin[k * (n - 1)]
+        and is_smooth(line, books.marks, 1 + k * (n - 2))
+    )
+
+
+@called
+def put_layer_at_end(line, state, books, k):
+    """Enter into strains[:, LAYER + k] the parts of the layer in which the curvature of a rod fades at end k."""
+    n, EI, T, h, column = line.h.shape[0], books.hinges[k, 0], state.T, line.h, LAYER + k
+    way, j = 1 - 2 * k, 1 + k * (n - 2)
+    books.strains[k * n, column] = towards(line, state, books.marks, k * n, way)
+    first, depth = T[k * (n - 1)], 0.0
+    while 0 < j < n and T[min(j, j - way)] > 0.0 and not line.spin[min(j, j - way)] and first > 0.0:
+        depth += depth_of(T[min(j, j - way)], EI, h[min(j, j - way)])
+        part = left_of(depth, 0.5 * max(T[j - 1] + T[j], 0.0), first)
+        if part <= FADED:
+            break
+        books.strains[j, column] = part
+        if not abs(line.s[j] - line.s[k * n]) < (1.0 - SAME_PLACE) * books.hinges[k, 1]:  # another stiffness
+            break
+        j += way
+
+
+@inner
+def put_layers(line, ends, state, books):
+    """Enter curvature of results into strains[:, BENT], and what fades at ends of catenaries behind LAYER.
+
+    Of rods with what joints take of it.  At joints themselves that of the side of the catenary is in strains[:, RAW].
+    """
+    n, bent = line.h.shape[0], books.strains
+    for i in range(n + 1):
+        if line.element[i]:
+            bent[i, BENT] = bent[i, RAW]
+        else:
+            bent[i, BENT] = of_chords(line, state.e, i) if is_smooth(line, books.marks, i) else 0.0
+            bent[i, LAYER], bent[i, LAYER + 1] = 0.0, 0.0
+    for k in range(2):
+        if is_hinge(line, books, k):
+            put_layer_at_end(line, state, books, k)
+    for i in range(1, n):
+        if line.spin[i] != line.spin[i - 1]:
+            put_layer_back(line, ends, state, books, i, 1 if line.spin[i] else -1)
+
+
+@called
+def put_layer_back(line, ends, state, books, i, way):
+    """Enter the curvature at the joint of node i, and what it takes of the rod on its side `way`."""
+    n, bent = line.h.shape[0], books.strains
+    x, y, _, _, _ = strain_of_moment(line, ends, state, books.hinges, i, way, (0.0, 0.0, 0.0), 0.0)
+    own, j, outer = math.sqrt(x * x + y * y), i + way, i - way
+    bent[i, RAW], bent[i, BENT] = towards(line, state, books.marks, i, -way), own
+    if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
+        return
+    T, EI = state.T[min(j, i)], stiffness_at(line, j)
+    direction, part = bend_direction(line, state.e, outer), layer_part(line, state, j, way, EI)
+    before = stiffness_share(EI, T, line.hn[i], line.h[min(outer, i)])
+    after = stiffness_share(EI, T, line.hn[i], line.h[min(j, i)])
+    along = dot(bend_direction(line, state.e, j), direction)
+    turned = dot(bend_direction(line, state.e, i), direction)
+    there = at_hinge(of_chords(line, state.e, i), turned, of_chords(line, state.e, outer), before, after, part)
+    bent[i, RAW], bent[i, BENT] = there, with_layer(own, there, along)
+    for _ in range(FARTHEST):
+        if part <= FADED:
+            break
+        along = dot(bend_direction(line, state.e, j), direction)
+        bent[j, BENT] = with_layer(bent[j, BENT], there * part, along)
+        j += way
+        if not (0 < j < n and goes_on(line, books.marks, j, way)):
+            break
+        part *= layer_part(line, state, j, way, stiffness_at(line, j))
+
+
+@called
+def direction_on_side(line, e, i, side, edge, moment):
+    """Direction of the curvature that was computed on a side of node i, across both chords; edge: whether it has two.
+
+    moment: at an end of the line that across the tangent there, N m.  At ends of stretches that no element bends across
+    it is that of the next node in the stretch, as at ends that are bent without a moment.
+    """
+    n = line.h.shape[0]
+    if n == 1:
+        return (0.0, 1.0, 0.0)
+    outer, rod = i == 0 or i == n, line.spin[min(i, i + side)]
+    if outer and rod and line.k0[i, 0] == 0.0 and line.k0[i, 1] == 0.0 and line.k0[i, 2] == 0.0:
+        size = math.sqrt(dot(moment, moment))
+        if size > 0.0:
+            return scale(1.0 / size, moment)
+    beside = outer or (edge and not (rod and line.element[i]))
+    return bend_direction(line, e, min(max(i + side if beside else i, 1), n - 1))
