@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.books import LOADED, SEAM
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
-from hybrid.kernels.watch.observed_outputs import Along, Found, observed
+from hybrid.kernels.watch.observed_outputs import Along, Found, observe_obstacles, observed
 from hybrid.model.mesh import Zone
 
 Integers = NDArray[np.int64]
@@ -434,6 +434,10 @@ class ObservedStates:
     def loaded(self, k: int) -> bool:
         """Whether there is a point load at end k."""
         return bool(self._along.loaded[k])
+
+    def press_obstacles(self, sea: Sea, outputs: slice, out: Floats) -> None:
+        """Enter what some outputs press on obstacles into (nb, M, ON_OBSTACLE); sea: with these as they are then."""
+        observe_obstacles(self._observed.tables[outputs], sea, out[outputs])
 
     @cached_property
     def bends(self) -> Floats:

@@ -315,25 +315,6 @@ def with_cell(energy, p0, p1, h, k, o):
 
 
 @kernel
-def press_cells(p0, p1, v0, v1, h, k, c, o, out):
-    """Forces N on both nodes of cells, and the energy (J) that these store, into `out` (3, n)."""
-    for i in range(h.shape[0]):
-        out[0, i] = contact(p0[i], p1[i], v0[i], v1[i], h[i], k, c, o)[0]
-        out[1, i] = contact(p1[i], p0[i], v1[i], v0[i], h[i], k, c, o)[0]
-        out[2, i] = with_cell(0.0, p0[i], p1[i], h[i], k, o)
-
-
-def half_cells(p0: Floats, p1: Floats, v0: Floats, v1: Floats, h: Floats, law: tuple[float, float, float]) -> Floats:
-    """Forces N on both nodes of n cells that touch, and the energy (J) that these store, (3, n).
-
-    p0, p1: m, penetration at the nodes; v0, v1: m/s, its rates; h: m; law: stiffness N/m per m, damping, onset m.
-    """
-    out = np.empty((3, len(h)))
-    press_cells(*map(np.ascontiguousarray, (p0, p1, v0, v1, h)), *law, out)
-    return out
-
-
-@kernel
 def stored(line, sea, r):
     """Energy (J) that the bed has stored under the line."""
     energy = 0.0

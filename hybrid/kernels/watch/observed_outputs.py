@@ -36,14 +36,17 @@ from hybrid.kernels.algebra.rotations import add, dot, get3, get9, scale, sub
 from hybrid.kernels.laws.bending_law import EACH, FROM, KEPT, MOMENT, MOST, STIFF, STIFFENING, STIFFNESS
 from hybrid.kernels.laws.closed_forms import depth_of
 from hybrid.kernels.laws.element import chord
-from hybrid.kernels.laws.seabed import interval, pressure
+from hybrid.kernels.laws.obstacles import meets, thinner
+from hybrid.kernels.laws.seabed import contact, interval, pressure, with_cell
+from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.machine.binding import Series
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.resolution_checks import strain_of
 from hybrid.kernels.state.books import STRAINS
-from hybrid.kernels.state.report import SEABED
+from hybrid.kernels.state.report import DAMPING, ONSET_OF, SEABED
+from hybrid.kernels.state.report import STIFFNESS as STIFFNESS_OF
 from hybrid.kernels.state.state import (
     ALONG_LINE,
     NO_TURN,
@@ -358,6 +361,7 @@ EDGES = 0  # 2, arc lengths of the first and last point, m
 PLACES = 2  # 2 x 3, where they are, m
 GROUNDED = 8  # m, the length in contact
 TOUCH = 9
+ON_OBSTACLE = 6  # numbers of what an output presses on an obstacle
 # Cells of less depth: between their nodes the layer at an end of a catenary is straight to 0.1 %.
 SHALLOW = 0.1
 # Largest depth of a cell: beyond, nothing is left of a layer, and its exponential would be zero.
@@ -518,6 +522,48 @@ def observe_bed(tables, sea):
             x.touch[EDGES + end], place = touch_at(sea, s, x.r, end)
             for j in range(3):
                 x.touch[PLACES + 3 * end + j] = place[j]
+
+
+@kernel
+def observe_obstacles(tables, sea, out):
+    """Find what outputs press on all obstacles, (nb, M, ON_OBSTACLE).
+
+    Resultant (3) and sum of the forces, N, their largest by length, N/m, energy, J; of cells of all obstacles.
+    """
+    for k in range(tables.shape[0]):
+        x = _read(tables[k])
+        for obstacle in range(sea.obstacles.shape[0]):
+            press_obstacle(x.line, sea, obstacle, x.r, x.v, out[k, obstacle])
+
+
+@called
+def press_obstacle(line, sea, k, r, v, out):
+    """The same of one output and obstacle k."""
+    rows, n, moves = sea.obstacles, line.h.shape[0], line.moved.shape[0] > 0
+    stiffness, damping, o = rows[k, STIFFNESS_OF], rows[k, DAMPING], rows[k, ONSET_OF]
+    d, normal, _ = surface(sea, k, get3(r, 0))
+    p, rate = 0.5 * o - d, -dot(normal, get3(v, 0))
+    force = length = 0.0  # of the half cell before a node
+    for j in range(ON_OBSTACLE):
+        out[j] = 0.0
+    for i in range(n + 1):
+        after, beside, there, h = 0.0, p, normal, 0.0
+        if i < n:
+            h = line.h[i]
+            d, there, _ = surface(sea, k, get3(r, i + 1))
+            beside, speed = 0.5 * o - d, -dot(there, get3(v, i + 1))
+            thin = thinner(line, rows, k, i)
+            a, b = p - thin, beside - thin
+            if (a > 0.0 or b > 0.0) and meets(line, sea, moves, k, i):
+                force += contact(a, b, rate, speed, h, stiffness, damping, o)[0]
+                after = contact(b, a, speed, rate, h, stiffness, damping, o)[0]
+                out[5] = with_cell(out[5], a, b, h, stiffness, o)
+            rate = speed
+        for j in range(3):
+            out[j] -= force * normal[j]
+        out[3] += force
+        out[4] = max(out[4], force / (0.5 * (length + h)))
+        force, length, p, normal = after, h, beside, there
 
 
 def slipped(line: Line, batch: Batch) -> Floats:
