@@ -117,14 +117,22 @@ def sample(resolution: Resolution, steps: int, order: float, every: int = 1, noi
     return RunSample(resolution, values, round(1000 * resolution.fineness), steps, 0.0, every)
 
 
+FIRST = Resolution(1.0, 0.1, None, 1e-3)
+
+
+def four(order: float, *noise: float, first: Resolution = FIRST, all_outputs: bool = False) -> list[RunSample]:
+    """A result, and runs of half the cells and steps, of steps half as long again, and of half these cells."""
+    each = ((1, 1, 100, 1), (2, 2, 50, 2), (2, 4, 25, 4), (4, 4, 25, 4))
+    off = noise or (0.0,) * 4
+    return [
+        sample(first.coarser(h, dt), steps, order, 1 if all_outputs else every, x)
+        for (h, dt, steps, every), x in zip(each, off, strict=True)
+    ]
+
+
 @pytest.mark.parametrize("order", [1.5, 1.75, 2.0])
 def test_an_error_of_one_order_is_found_exactly(order):
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    final = sample(resolution, 100, order)
-    coarse = sample(resolution.coarser(2, 2), 50, order, 2)
-    rough = sample(resolution.coarser(2, 4), 25, order, 4)
-    coarsest = sample(resolution.coarser(4, 4), 25, order, 4)
-    estimate = Estimate(final, coarse, rough, coarsest)
+    estimate = Estimate(*four(order))
     assert estimate.order["position"] == pytest.approx(order, abs=1e-6)
     found = estimate.errors
     # the largest at t = 1 s; at outputs in between the error is interpolated, and here it is linear
@@ -139,21 +147,15 @@ def test_an_error_of_one_order_is_found_exactly(order):
 
 def test_orders_are_bounded():
     """Runs that do not converge count as of the least order: the figure is most of what the last refinement has changed."""
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    runs = [sample(resolution, 100, 2.0, 1, 0.0), sample(resolution.coarser(2, 2), 50, 2.0, 2, 0.5)]
-    runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4, 0.5), sample(resolution.coarser(4, 4), 25, 2.0, 4, 0.3)]
-    estimate = Estimate(*runs)
+    estimate = Estimate(*four(2.0, 0.0, 0.5, 0.5, 0.3))
     assert estimate.order["position"] == ORDERS[0]
     assert estimate.errors.largest("total", "position") > 0.3
 
 
 def test_a_force_at_an_end_may_be_of_low_order():
     """As after a start that is no equilibrium; by order 1.5 its figure was 0.65 of the truth, and was said to be met."""
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
     for p in (1.25, 1.0):
-        runs = [sample(resolution, 100, p), sample(resolution.coarser(2, 2), 50, p, 2)]
-        runs += [sample(resolution.coarser(2, 4), 25, p, 4), sample(resolution.coarser(4, 4), 25, p, 4)]
-        estimate = Estimate(*runs, from_rest=False)
+        estimate = Estimate(*four(p), from_rest=False)
         assert estimate.order == pytest.approx({"position": ORDERS[0], "reaction_end": p}, abs=1e-3)
         total = estimate.errors.largest("total", "end_force_end")
         assert SAFETY * 0.03 * 0.95 < total <= SAFETY * 0.03 * 1.001
@@ -162,21 +164,14 @@ def test_a_force_at_an_end_may_be_of_low_order():
 @pytest.mark.parametrize(("order", "later", "found"), [(0.6, 0.0, 1.5), (0.6, 0.4, 1.0), (1.0, 0.4, 1.5)])
 def test_forces_of_a_shaken_line_that_fall_slower_than_first_order(order, later, found):
     """A ramp that sets off vibrations along the line (steps are longer later) is a shock to it."""
-    resolution = Resolution(1.0, 0.1, 1e-3, 1e-3, later=later)
-    runs = [sample(resolution, 100, order), sample(resolution.coarser(2, 2), 50, order)]
-    runs += [sample(resolution.coarser(2, 4), 25, order), sample(resolution.coarser(4, 4), 25, order)]
+    runs = four(order, first=Resolution(1.0, 0.1, 1e-3, 1e-3, later=later), all_outputs=True)
     assert Estimate(*runs).order["reaction_end"] == found
 
 
 def test_runs_that_are_too_coarse_show_no_high_order():
     """A force that the coarsest run has three times too large falls by 2.7 orders, and the next run shows 1.3."""
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    runs = [sample(resolution, 100, 2.0, 1, 0.15), sample(resolution.coarser(2, 2), 50, 2.0, 2, 0.5)]
-    runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4, 0.5), sample(resolution.coarser(4, 4), 25, 2.0, 4, 3.0)]
-    assert Estimate(*runs).order == {"position": ORDERS[1], "reaction_end": ORDERS[0]}
-    runs = [sample(resolution, 100, 2.0), sample(resolution.coarser(2, 2), 50, 2.0, 2)]
-    runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4), sample(resolution.coarser(4, 4), 25, 2.0, 4)]
-    found = [Estimate(*runs, from_rest=x).order["reaction_end"] for x in (True, False)]
+    assert Estimate(*four(2.0, 0.15, 0.5, 0.5, 3.0)).order == {"position": ORDERS[1], "reaction_end": ORDERS[0]}
+    found = [Estimate(*four(2.0), from_rest=x).order["reaction_end"] for x in (True, False)]
     assert found == pytest.approx([2.0, ORDER])  # runs that show 2 after a shock do not carry its waves
 
 
@@ -186,12 +181,9 @@ def test_a_finer_run_confirms_a_low_order_or_takes_it_back(first, order):
 
     Coarse runs before and after a contact seem not to converge, and later do.
     """
-    resolution, noise = Resolution(1.0, 0.1, None, 1e-3), (0.0, 0.5, 0.3) if first == 2.0 else (0.0, 0.0, 0.0)
-    runs = [sample(resolution, 100, first, 1, noise[0]), sample(resolution.coarser(2, 2), 50, first, 1, noise[1])]
-    runs += [sample(resolution.coarser(2, 4), 25, first, 1, noise[1])]
-    runs += [sample(resolution.coarser(4, 4), 25, first, 1, noise[2])]
+    runs = four(first, *((0.0, 0.5, 0.5, 0.3) if first == 2.0 else ()), all_outputs=True)
     assert Estimate(*runs).order["reaction_end"] == ORDERS[0]
-    finer = sample(replace(resolution, fineness=3.0), 300, first)
+    finer = sample(replace(FIRST, fineness=3.0), 300, first)
     found = []
     for kept in (False, True):  # a checkpoint in between changes nothing
         estimate = Estimate(*runs, from_rest=False)
@@ -255,21 +247,17 @@ def test_statistics_are_estimated_where_a_motion_is_judged_by_them(monkeypatch):
 
 def test_a_run_is_refined_further_where_its_order_has_turned_out_lower():
     """Errors fall to a third; by the figure of the run before, which was too small, to 0.46, too slowly to arrive."""
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    runs = [sample(resolution, 100, 1.0), sample(resolution.coarser(2, 2), 50, 1.0)]
-    runs += [sample(resolution.coarser(2, 4), 25, 1.0), sample(resolution.coarser(4, 4), 25, 1.0)]
     asked = RequestedAccuracy(None, SAFETY * 0.01 / 6.0, None)
     control = LineErrors(asked, Free(True, True, False), True)
-    control.estimate = Estimate(*runs)
+    control.estimate = Estimate(*four(1.0, all_outputs=True))
     assert control.next_resolution() is not None
-    control.estimate.update(sample(replace(resolution, fineness=3.0), 300, 1.0))
+    control.estimate.update(sample(replace(FIRST, fineness=3.0), 300, 1.0))
     assert control.verdict(asked).ratio == pytest.approx(6.0, rel=0.01)
     assert control.next_resolution() is not None
 
 
 def test_without_the_rougher_runs_an_order_in_between_is_taken():
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    estimate = Estimate(sample(resolution, 100, 2.0), sample(resolution.coarser(2, 2), 50, 2.0, 2), None, None)
+    estimate = Estimate(*four(2.0)[:2], None, None)
     assert ORDERS[0] <= estimate.order["position"] < ORDERS[1]
     assert 1.0 < estimate.errors.largest("total", "position") / 0.03 < 2.0
     assert "time" not in estimate.errors.fields
@@ -346,23 +334,16 @@ def test_what_a_hardly_finer_run_differs_by_is_not_taken_for_its_error(finer, la
 
     Amplified by 1/(1.2^2 - 1) it was an error of 0.08 m, and a finer result was the less accurate one.
     """
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    runs = [sample(resolution, 100, 2.0), sample(resolution.coarser(2, 2), 50, 2.0, 2)]
-    estimate = Estimate(
-        *runs, sample(resolution.coarser(2, 4), 25, 2.0, 4), sample(resolution.coarser(4, 4), 25, 2.0, 4)
-    )
+    estimate = Estimate(*four(2.0))
     before = estimate.errors.largest("mesh", "position")
-    estimate.update(sample(replace(resolution, fineness=finer), 100, 2.0, noise=-0.03))
+    estimate.update(sample(replace(FIRST, fineness=finer), 100, 2.0, noise=-0.03))
     after = estimate.errors.largest("mesh", "position")
     assert before / finer**2 <= after < largest
 
 
 def test_what_finer_runs_change_as_much_does_not_converge():
     """A peak between cells: each halving finds as much of it as the one before."""
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    runs = [sample(resolution, 100, 2.0, 1, 0.0), sample(resolution.coarser(2, 2), 50, 2.0, 2, 0.5)]
-    runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4, 0.5), sample(resolution.coarser(4, 4), 25, 2.0, 4, 0.7)]
-    estimate = Estimate(*runs)
+    estimate = Estimate(*four(2.0, 0.0, 0.5, 0.5, 0.7))
     assert set(estimate.not_converged) == {"position", "end_force_end"}
     assert [kind for kind, _ in not_converged(estimate.not_converged, None)] == ["error uncertain"]
     asked = RequestedAccuracy(0.1, None, None)
@@ -704,9 +685,8 @@ def test_notes_and_model_error_are_of_the_runs_that_count(monkeypatch):
 
 def test_an_accuracy_that_costs_more_than_four_times_its_last_run_says_so_before_it():
     """Three runs of 1 s and two results of 2 s before a third that is half finer again: 10 s, 3.3 times; then 4.3."""
-    resolution = Resolution(1.0, 0.1, None, 1e-3)
-    before = replace(made_up(), resolution=resolution, cpu=2.0)
-    finer = replace(resolution, fineness=1.5)
+    before = replace(made_up(), resolution=FIRST, cpu=2.0)
+    finer = replace(FIRST, fineness=1.5)
     assert costly([1.0, 1.0, 1.0, 2.0, 2.0], before, finer) == []
     ((kind, text),) = costly([1.0, 1.0, 1.0, 2.0, 2.0, 3.0], before, finer)
     assert kind == "costly accuracy" and "run 7" in text and "13 s" in text and "4.3 times" in text

@@ -41,6 +41,14 @@ def noisy(amplitude: float, late: float = 0.0, count: int = 4001) -> np.ndarray:
     return 5e3 + amplitude * np.sin(np.pi * (t - late)) * (1.0 + 0.1 * np.sin(0.37 * (t - late)))
 
 
+def as_run(force: np.ndarray, resolution: Resolution, at_start: float = 1.0) -> RunSample:
+    """A run with a force at its end at every step, and a part of it at its start."""
+    steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), at_start * force, force])
+    kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
+    found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
+    return replace(found, resolution=resolution, forces=steps)
+
+
 def values(found: dict[str, RunSample], name: str) -> list[float]:
     """STATISTICS of an output: of its first component, at its first point."""
     return [float(found[x].values[name].flat[0]) for x in STATISTICS]
@@ -174,10 +182,7 @@ def test_a_largest_force_by_chance_is_not_judged():
     def sample(resolution: Resolution) -> RunSample:
         force = noisy(1e3 * (1.0 + 1e-3 / resolution.fineness**2))
         force[2000] = snaps[resolution.fineness, resolution.every]
-        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), force, force])
-        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
-        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
-        return replace(found, resolution=resolution, forces=steps)
+        return as_run(force, resolution)
 
     asked = RequestedAccuracy(None, None, 0.01)
     control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
@@ -194,12 +199,10 @@ def test_chance_in_means_over_windows_is_seen_from_window_to_window(scatter, unc
     rng = np.random.default_rng(5)
 
     def sample(resolution: Resolution) -> RunSample:
-        t, force = np.linspace(0.1, 400.0, 4001), noisy(1e3)
+        force = noisy(1e3)
         force[2000] = 20e3
         force[40::80] += scatter * rng.normal(size=len(force[40::80])) + 2e3
-        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
-        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
-        return replace(found, resolution=resolution, forces=np.column_stack([t, force, force]))
+        return as_run(force, resolution)
 
     asked = RequestedAccuracy(None, None, 0.01)  # 200 N
     control = OneLine(asked, Free(False, False, False), sample, sample, irregular=True)
@@ -222,10 +225,7 @@ def test_a_largest_force_within_the_scatter_of_windows_is_not_refined(scatter, r
         force = noisy(1e3)
         force[40::80] += scatter * rng.normal(size=len(force[40::80])) + 4e3
         force[2000] = snaps.get((resolution.fineness, resolution.every), 20e3)
-        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), force, force])
-        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
-        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
-        return replace(found, resolution=resolution, forces=steps)
+        return as_run(force, resolution)
 
     asked = RequestedAccuracy(None, None, 0.02)
     control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
@@ -247,10 +247,7 @@ def test_a_largest_force_that_snaps_may_exceed_is_not_judged(scatter, uncertain)
         force[2000] = 12e3
         for k in range(400, 4000, 800):
             force[k - 3], force[k] = 100.0, 11e3 + scatter * float(rng.uniform(-1.0, 0.0))
-        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), 0.5 * force, force])
-        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
-        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
-        return replace(found, resolution=resolution, forces=steps)
+        return as_run(force, resolution, 0.5)
 
     asked = RequestedAccuracy(None, None, 0.01)
     control = OneLine(asked, Free(False, False, False), sample, sample, irregular=True)
@@ -306,10 +303,7 @@ def test_means_over_windows_that_do_not_converge_are_not_refined():
         force = noisy(1e3)
         force[40::80] += 2e3 + off.get((resolution.fineness, resolution.every), 0.0)
         force[2000] = 20e3
-        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), force, force])
-        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
-        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
-        return replace(found, resolution=resolution, forces=steps)
+        return as_run(force, resolution)
 
     asked = RequestedAccuracy(None, 100.0, None)
     control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
