@@ -37,7 +37,7 @@ from hybrid.store.whole_file import LateFile
 from hybrid.view.notebook import card
 from hybrid.view.panels import page_of
 from hybrid.view.summary import facts_of
-from tests.scenes import cable_scene, line_between, network_scene, pinned_at
+from tests.scenes import line_between, network_scene
 
 ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"
 
@@ -61,21 +61,22 @@ def two_lines(accuracy: str = "0.3%") -> dict[str, Any]:
     )  # fmt: skip
 
 
-def rougher(resolution: Resolution) -> Resolution:
-    assert resolution.local is not None
-    return replace(resolution.coarser(16.0, 1.0), local=15.0 * resolution.local)
+def make_rough(monkeypatch: pytest.MonkeyPatch, cells: float = 16.0, steps: float = 15.0) -> None:
+    """Let first results be far too coarse for what is asked, so that finer ones follow."""
+    surveyed = passes.Passes._surveyed
+
+    def made(self: passes.Passes, first: NetworkResolution) -> NetworkResolution:
+        each = surveyed(self, first).lines.items()
+        return NetworkResolution({k: replace(x.coarser(cells, 1.0), local=steps * (x.local or 0.0)) for k, x in each})
+
+    monkeypatch.setattr(passes.Passes, "_surveyed", made)
 
 
 @pytest.fixture
 def rough(monkeypatch: pytest.MonkeyPatch) -> None:
-    """First results that are far too coarse for what is asked, so that finer ones follow."""
-    surveyed = passes.Passes._surveyed
-
-    def made(self: passes.Passes, first: NetworkResolution) -> NetworkResolution:
-        return NetworkResolution({name: rougher(x) for name, x in surveyed(self, first).lines.items()})
-
+    """First results that finer ones follow, and runs that are heard at every step."""
     monkeypatch.setattr(run_module, "LOOK", 1)
-    monkeypatch.setattr(passes.Passes, "_surveyed", made)
+    make_rough(monkeypatch)
 
 
 def stopped_in(name: str, scene: dict[str, Any], path: Path) -> None:
@@ -451,25 +452,17 @@ def test_of_several_lines_the_worst_decides() -> None:
     assert is_no_better({}, {"a": far[0]}, {"a": far[1]}) is None  # nothing is asked
 
 
-def swinging(accuracy: str) -> hybrid.Scene:
-    section = {"length": 2.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5, "drag": {"normal": 1.2}}
-    motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
-    return hybrid.validate_scene(cable_scene(
-        section, pinned_at(0, 0, 0), pinned_at(1.5, 0, 0, motion=motion), fluid={"density": 1000.0}, model="catenary",
-        time={"duration": 3.0}, output=(0.1, 21), accuracy=accuracy
-    ))  # fmt: skip
-
-
 @pytest.mark.long
+@pytest.mark.usefixtures("rough")
 @pytest.mark.parametrize("file", [True, False])
 def test_the_file_is_that_of_the_run_before(file, tmp_path, monkeypatch) -> None:
     """Of results in memory and in a file, which is left alone there."""
     path = tmp_path / "run.h5" if file else None
-    with hybrid.run(swinging("0.3%")) as both:
+    with hybrid.run(asked()) as both:
         assert both.attributes["effort_runs"] > 4  # a finer run follows the first
         cells = both.attributes["cells"]
     monkeypatch.setattr(error_control, "is_no_better", lambda *_: Verdict(2.0, 1.0, 1.0, 0.0, "no use"))
-    with hybrid.run(swinging("0.3%"), path) as result:
+    with hybrid.run(asked(), path) as result:
         assert result.attributes["cells"] < cells and result.status == "complete"
         assert len(result.steps["t"]) > 0 and result.attributes["error_total_position"] > 0.0
         (said,) = [e.text for e in result.events if e.kind == NOT_KEPT]
@@ -514,29 +507,12 @@ def test_short_runs_are_refined_whatever_it_takes_and_outputs_count() -> None:
 
 def test_what_is_beyond_is_not_computed_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The result that there is stays, and says what it meets; resumed from its first step it is refined no more."""
-    scene: dict[str, Any] = cable_scene(
-        {"length": 2.0, "mass": 0.5, "axial_stiffness": 1e5}, pinned_at(0, 0, 0),
-        pinned_at(1.5, 0, 0, motion={"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}), model="catenary",
-        time={"duration": 2.0}, accuracy="0.3%", output=(0.1, 11)
-    )  # fmt: skip
-    from hybrid.accuracy import passes
-
-    surveyed = passes.Passes._surveyed
-
-    def rougher(self: passes.Passes, first: NetworkResolution) -> NetworkResolution:
-        return NetworkResolution(
-            {
-                name: replace(x.coarser(8.0, 1.0), local=10.0 * (x.local or 0.0))
-                for name, x in surveyed(self, first).lines.items()
-            }
-        )
-
-    monkeypatch.setattr(passes.Passes, "_surveyed", rougher)
-    with hybrid.run(scene, tmp_path / "free.h5") as free:
+    make_rough(monkeypatch, 8.0, 10.0)
+    with hybrid.run(asked(), tmp_path / "free.h5") as free:
         assert free.attributes["effort_runs"] > 4
     monkeypatch.setattr(module, "LEAST", 0.0)
     monkeypatch.setattr(module, "MOST_TIMES", 1.0)
-    with hybrid.run(scene, tmp_path / "run.h5") as result:
+    with hybrid.run(asked(), tmp_path / "run.h5") as result:
         (missed,) = [event.text for event in result.events if event.kind == "accuracy missed"]
         assert result.attributes["effort_runs"] == 4 and result.done
         assert "refined no further" in missed and "which this run meets" in missed

@@ -7,16 +7,14 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import pytest
 from bits import Stopping, differences
+from test_result_first import make_rough
 
 import hybrid
-from hybrid.accuracy.passes import Passes
-from hybrid.model.network import NetworkResolution
 from hybrid.simulation import case as cases
 from hybrid.simulation.progress import PRE_RUN, REFINEMENT, Progress
 from hybrid.store.checkpoint import read_before
@@ -29,17 +27,7 @@ TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 def always(monkeypatch: pytest.MonkeyPatch) -> None:
     """Files for short runs as well, and first results that miss what is asked."""
     monkeypatch.setattr(cases, "MOST_IN_MEMORY", 0)
-    surveyed = Passes._surveyed
-
-    def rougher(self: Passes, first: NetworkResolution) -> NetworkResolution:
-        return NetworkResolution(
-            {
-                name: replace(x.coarser(8.0, 1.0), local=10.0 * (x.local or 0.0))
-                for name, x in surveyed(self, first).lines.items()
-            }
-        )
-
-    monkeypatch.setattr(Passes, "_surveyed", rougher)
+    make_rough(monkeypatch, 8.0, 10.0)
 
 
 def scene(*settings: str) -> hybrid.Scene:
