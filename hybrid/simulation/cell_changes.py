@@ -24,7 +24,7 @@ from hybrid.kernels.mesh.cell_changes import (
     renew,
 )
 from hybrid.kernels.mesh.remesh import blank_kinds_job, blank_line_job, fill_kinds, fill_line
-from hybrid.kernels.mesh.zone_transfer import Match, Transfer
+from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import PLANAR, REMEMBERS
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
@@ -32,7 +32,7 @@ from hybrid.model.build import Model
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import kinds_of
 from hybrid.outputs.joined_lines import Output, outputs_in
-from hybrid.simulation.remesh import PAIRS, OfRun, OneOfMany, Part, Remesh, Shaped, by_itself, copy_fields, shaped
+from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
 from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching
 from hybrid.zones.manager import OF_BASE, all_zones
@@ -59,34 +59,9 @@ class Cells(NamedTuple):
     rods: np.ndarray
 
 
-class Joined(NamedTuple):
-    """Of kernels.mesh.zone_transfer.Match what new cells have."""
-
-    same: np.ndarray
-    left: np.ndarray
-    kept: np.ndarray
-    lengths: Floats
-
-
-class Single(NamedTuple):
-    """And what old nodes have."""
-
-    single: np.ndarray
-
-
 def blank_cells(n: int) -> Cells:
     """Room for a layout of n cells."""
     return Cells(np.zeros(n + 1, int), np.zeros(n + 1), np.zeros(n, int), np.zeros(n, bool))
-
-
-def blank_joined(n: int) -> Joined:
-    """Room for n new cells."""
-    return Joined(np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64), np.zeros(n, np.int64), np.zeros(n))
-
-
-def blank_single(n: int) -> Single:
-    """Room for n old cells."""
-    return Single(np.zeros(n + 1, np.int8))
 
 
 class CellChanges(Remesh):
@@ -96,11 +71,10 @@ class CellChanges(Remesh):
 
     def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
         """Room for all; `adopt` before the first change."""
-        owner = OneOfMany(run, number, switching)
-        model, layout = owner.model, owner.model.layout
+        model, layout = run.model.models[number], run.model.models[number].layout
         assert layout is not None
-        self._switching, self._marked = switching, marks_on(layout.base, owner.marked)
-        super().__init__(run, number, owner, int(layout.starts[-1]), int((self._marked != 0).sum()))
+        self._switching, self._marked = switching, marks_on(layout.base, run.lines[number].marked)
+        super().__init__(run, number, int(layout.starts[-1]), int((self._marked != 0).sum()))
         base, most = layout.rod.size, self.most
         self._starts, self._finest = layout.starts, layout.finest.nodes
         self._piece = model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
@@ -108,15 +82,14 @@ class CellChanges(Remesh):
         self._kinds, self._zones, self._cells = (
             (Room(x, most), Room(x, most)) for x in (kinds_of, all_zones, Packed(blank_cells))
         )
-        self._match = Room(Packed(blank_joined), most), Room(Packed(blank_single), most)
-        self._twist, self._clamps, self._held = np.zeros(base), np.zeros((2, 2, 3)), np.zeros(2, bool)
+        self._match = Room(Packed(lambda n: blank_match(n, n)), most)
+        self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._shifts, self._places = np.zeros(1, bool), np.zeros(MOST_PLACES, np.int64)
 
-    @staticmethod
-    def _key(owner: OneOfMany) -> tuple[Any, ...]:
+    def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
-        model = owner.model
-        return id(model.on_base), model.line.bits, id(model.line.plane), id(model.ends), bool(owner.push.size)
+        model = self.model
+        return id(model.on_base), model.line.bits, id(model.line.plane), id(model.ends), bool(self.pushes[0].size)
 
     def fits_zones(self, switching: ZoneSwitching) -> bool:
         """Whether the line is solved by what the arrays were made for, and its zones are these."""
@@ -157,7 +130,7 @@ class CellChanges(Remesh):
         }  # fmt: skip
 
     def _line_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
-        to, model = 1 - k, self._owner.model
+        to, model = 1 - k, self.model
         assert model.on_base is not None
         at = self._layout(to, m)
         return {
@@ -165,7 +138,7 @@ class CellChanges(Remesh):
         }  # fmt: skip
 
     def _kinds_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
-        to, model = 1 - k, self._owner.model
+        to, model = 1 - k, self.model
         assert model.on_base is not None
         return {
             "cable": model.on_base.cable, "base_of_cell": self._layout(to, m).of, "kinds": self._zones_on(to, m).kinds,
@@ -175,14 +148,14 @@ class CellChanges(Remesh):
     def _switch_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         to, switching = 1 - k, self._switching
         at = self._layout(to, m)
-        match = Match(**self._view(self._match[0], m)._asdict(), **self._view(self._match[1], n)._asdict())
+        match = self._view(self._match, m)._replace(single=self._view(self._match, n).single)
         transfer = Transfer(
             self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m),
-            self._layout(k, n).place, at.place, at.of, self._first[k], switching.kinks, self._twist, self._clamps,
-            self._held, self._shifts, match,
+            self._layout(k, n).place, at.place, self._first[k], switching.kinks, self._clamps, self._held,
+            self._shifts, match,
         )  # fmt: skip
         return {
-            "transfer": transfer, "ends": self._owner.model.ends.values, "sea": self._sea_on(n),
+            "transfer": transfer, "ends": self.model.ends.values, "sea": self._sea_on(n),
             "target_sea": self._sea_on(m), "zones": self._zones_on(k, n), "target_zones": self._zones_on(to, m),
             "numbers": self._numbers, "guided": switching.guided,
         }  # fmt: skip
@@ -197,11 +170,11 @@ class CellChanges(Remesh):
             "work": self._work_on(m), "zones": self._zones_on(to, m), "before": self._books(k, n),
             "books": self._books(to, m), "push": self._push(k, parity, n), "new_push": self._push(to, 0, m),
             "next_push": self._push(to, 1, m), "width": self._width(m), "nearest": self._itself.cells,
-            "scale": self._owner.model.tension_scale, **self._along,
+            "scale": self.model.tension_scale, **self._along,
         }  # fmt: skip
 
     def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
-        owner, model = self._owner, self._owner.model
+        model = self.model
         extra = int((self._marked != 0).sum())
         self._along: dict[str, Any] = {
             "borne": 1.0 + model.cable.max_strain[self._piece],
@@ -210,7 +183,7 @@ class CellChanges(Remesh):
             "bounds": np.zeros((4, b.EXTREMES, 1)), "stays": np.zeros(self.most + 1, np.int64),
             "spare": np.zeros(4 * b.EXTREMES * (self.most + 1 + extra)),
         }  # fmt: skip
-        if (envelope := owner.envelope) is not None:
+        if (envelope := self._line.envelope) is not None:
             self._along |= {"bounds": envelope.bounds, "envelope_s": envelope.s, "start": envelope.start}
         of_line = shaped(blank_line_job, self._line_job, *PAIRS)
         self._fill = of_line[2], of_line[0]  # by the side that the line is on
@@ -228,19 +201,20 @@ class CellChanges(Remesh):
         return tables, parts, 3
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
-        zones, owner, tables = self._switching.zones, self._owner, []
+        zones, tables = self._switching.zones, []
         for k in (0, 1):
             at, table = self._layout(1 - k, self.most), Table(blank_cell_planner)
             table.bind(
                 plan=zones.plan, rod=zones.next_rod, parts=zones.parts, finest=self._finest, place=at.place, s=at.s,
-                of=at.of, rods=at.rods, first=self._first[1 - k], here=zones.here, at=self._at, clock=owner.clock,
+                of=at.of, rods=at.rods, first=self._first[1 - k], here=zones.here, at=self._at,
+                clock=self._run.loop.clock,
                 zone_clock=zones.clock, zone_counts=zones.counts, numbers=self._numbers, places=self._places,
             )  # fmt: skip
             tables.append(table)
         return (cells_due, plan_cells, keep_places), tables, self._places.size
 
     def _copy_beside(self, n: int) -> None:
-        switching, model = self._switching, self._owner.model
+        switching, model = self._switching, self.model
         zones, at, layout = self._zones_on(0, n), self._layout(0, n), model.layout
         assert layout is not None
         copy_fields(switching.zones, zones, (*OF_BASE, "kinds"))
@@ -249,7 +223,7 @@ class CellChanges(Remesh):
         self._first[0][:] = self._base[:] = layout.first
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
-        model, zones = self._owner.model, self._zones_on(self.side, self.cells)
+        model, zones = self.model, self._zones_on(self.side, self.cells)
         assert model.layout is not None
         layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy())
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
@@ -260,16 +234,13 @@ class CellChanges(Remesh):
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
-        switching, manager, t = self._switching, self._switching.manager, self._owner.t
+        switching, manager, t = self._switching, self._switching.manager, self._run.t
         switching.zones.next_rod[:] = change.rod
         z.plan_next(switching.table.numbers)
-        for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at_time(t))):
-            self._held[k] = clamp is not None
-            if clamp is not None:
-                self._clamps[k] = clamp
+        self._clamps[:], self._held[:] = switching.clamps(self.model.ends.at_time(t))
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.use_cells_of(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
-        switching.limit_steps(self._owner.clock)
+        switching.limit_steps(self._run.loop.clock)
         self.sync()
         return booked
 
@@ -289,7 +260,7 @@ class CellChanges(Remesh):
 
     def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
         """With nodes at places of the finest mesh that are kept, in the arrays that are not in use."""
-        model, k, places = self._owner.model, 1 - self.side, self._places[begin : begin + cells + 1]
+        model, k, places = self.model, 1 - self.side, self._places[begin : begin + cells + 1]
         assert model.layout is not None
         at, table = self._layout(k, cells), self._fill[k].table.numbers
         at.place[:], at.s[:] = places, self._finest[places]
@@ -300,4 +271,4 @@ class CellChanges(Remesh):
         return outputs_in(batch, self.line(k, cells), model.zones), begin + cells + 1
 
     def _outputs_now(self, batch: Batch) -> list[Output]:
-        return outputs_in(batch, self._owner.model.line, self._owner.model.zones)
+        return outputs_in(batch, self.model.line, self.model.zones)

@@ -34,18 +34,7 @@ from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.outputs.joined_lines import Output
-from hybrid.simulation.remesh import (
-    NO_LAWS,
-    PAIRS,
-    OfRun,
-    OneOfMany,
-    Part,
-    Remesh,
-    Shaped,
-    by_itself,
-    copy_fields,
-    shaped,
-)
+from hybrid.simulation.remesh import NO_LAWS, PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
 from hybrid.simulation.result_file import marks_on
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
@@ -58,12 +47,12 @@ class NodeChanges(Remesh):
 
     def __init__(self, run: OfRun, number: int) -> None:
         """Room for all; `adopt` before the first change."""
-        owner = OneOfMany(run, number)
-        assert owner.payout is not None
-        self._paying, model = owner.payout, owner.model
+        paying, model = run.lines[number].paying, run.model.models[number]
+        assert paying is not None
+        self._paying = paying
         plan, reel, twice, damped = self._paying.plan, self._paying.reel, self._paying.solves_twice, self._paying.damped
-        most, extra = self._paying.most_cells, int((marks_on(model.line.s, owner.marked) != 0).sum())
-        super().__init__(run, number, owner, most, extra, twice)
+        most, extra = self._paying.most_cells, int((marks_on(model.line.s, run.lines[number].marked) != 0).sum())
+        super().__init__(run, number, most, extra, twice)
         reels = Packed(
             lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped), given=SHARED
         )
@@ -73,13 +62,11 @@ class NodeChanges(Remesh):
         self._line_table = Table(blank_line_job())
         self._whole = plan.whole_line(model.line, plan.held_as(model.cable))
 
-    @staticmethod
-    def _key(owner: OneOfMany) -> tuple[Any, ...]:
+    def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
-        model, paying = owner.model, owner.payout
-        assert paying is not None
-        same = id(model.line.plane), id(model.ends), id(paying.reel.law), id(owner.envelope)
-        return model.line.bits, bool(owner.push.size), *same
+        model = self.model
+        same = id(model.line.plane), id(model.ends), id(self._paying.reel.law), id(self._line.envelope)
+        return model.line.bits, bool(self.pushes[0].size), *same
 
     @staticmethod
     def may_change(run: OfRun, number: int) -> bool:
@@ -112,20 +99,20 @@ class NodeChanges(Remesh):
 
     def _node_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         """What a change from n cells, in the arrays of side k, to m is bound to."""
-        owner, to, before = self._owner, 1 - k, self._books(k, n)
+        model, to, before = self.model, 1 - k, self._books(k, n)
         carry = CarryJob(
             self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m), self._reel(k, n),
-            self._reel(to, m), owner.clock, before.tension, self._paying.plan.nodes,
+            self._reel(to, m), self._run.loop.clock, before.tension, self._paying.plan.nodes,
         )  # fmt: skip
         job = NodeJob(
-            carry, self._whole, owner.model.ends.values, self._sea_on(m), self._work_on(m), self.state(to, 1, m),
+            carry, self._whole, model.ends.values, self._sea_on(m), self._work_on(m), self.state(to, 1, m),
             before, self._books(to, m), self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m),
-            self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, owner.model.tension_scale,
+            self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale,
         )  # fmt: skip
         return job._asdict()
 
     def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
-        envelope, plan, most = self._owner.envelope, self._paying.plan, self.most + 2
+        envelope, plan, most = self._line.envelope, self._paying.plan, self.most + 2
         way = slice(None, None, 1 if plan.side else -1)
         start, bounds = np.zeros((plan.nodes.size, 3)), np.zeros((4, b.EXTREMES, 1))
         if envelope is not None:
@@ -151,7 +138,7 @@ class NodeChanges(Remesh):
         copy_fields(self._paying.reel, self._reel(0, n), SHARED)
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
-        model, paying, length = self._owner.model, self._paying, float(line.s[-1] - line.s[0])
+        model, paying, length = self.model, self._paying, float(line.s[-1] - line.s[0])
         paying.count, paying.reel = self.cells - paying.rides, self._reel(self.side, self.cells)
         zones = paying.plan.zones_of(length)
         return replace(model, line=line, zones=zones, sea=model.sea.with_values(sea), length=length)
@@ -160,7 +147,7 @@ class NodeChanges(Remesh):
 
     def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
         """With what its cells lacked, which is kept."""
-        k, paying, model, end = self.side, self._paying, self._owner.model, begin + OF_REEL * cells
+        k, paying, model, end = self.side, self._paying, self.model, begin + OF_REEL * cells
         line = lines(cells, bits=model.line.bits, plane=model.line.plane, **NO_LAWS)
         reel = self._reel(1 - k, cells)
         reel.numbers[:] = paying.reel.numbers
@@ -170,7 +157,7 @@ class NodeChanges(Remesh):
         return paying.outputs_in(line, reel, batch), end
 
     def _outputs_now(self, batch: Batch) -> list[Output]:
-        return self._paying.outputs_of_now(self._owner.model.line, batch)
+        return self._paying.outputs_of_now(self.model.line, batch)
 
 
 def is_plain(line: Line) -> bool:

@@ -24,7 +24,7 @@ from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
 from hybrid.kernels.run.entry import NO_PUSH, workspace
 from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, Clock, Counts
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import (
     NO_GRIP,
     NO_PEAK,
@@ -44,7 +44,7 @@ from hybrid.kernels.state.state import (
     Work,
     no_sea,
 )
-from hybrid.kernels.step.newton import RUN, Limits, Task, blank_job
+from hybrid.kernels.step.newton import RUN, Task, blank_job
 from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.model.network import NetworkModel
@@ -55,7 +55,7 @@ from hybrid.solve.contact import SelfContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import HEAVY
-from hybrid.zones.change import ZoneSwitching, states
+from hybrid.zones.change import states
 
 if TYPE_CHECKING:
     from hybrid.simulation.payout import PayingOut
@@ -110,53 +110,6 @@ class OfRun(Protocol):
     def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
 
 
-class LineTables:
-    """Tables of a line that change together: of its steps by itself, and of those of all lines by their parity."""
-
-    def __init__(self, alone: Table, even: Table, odd: Table) -> None:
-        self.alone, self.even, self.odd = alone, even, odd
-        self.numbers = alone.numbers
-
-    def part(self, name: str) -> slice:
-        """As of `Table`."""
-        return self.alone.part(name)
-
-    def bind(self, **values: Any) -> None:
-        """As of `Table`, of what steps of the line by itself alone have."""
-        self.alone.bind(**values)
-
-    def hold(self, *, old: State, new: State, **values: Any) -> None:
-        """As of `Table`."""
-        for table in (self.alone, self.even):
-            table.hold(old=old, new=new, **values)
-        self.odd.hold(old=new, new=old, **values)
-
-
-class WatchedLine:
-    """How near a line comes to itself, as changes of cells see it."""
-
-    on = True
-
-    def __init__(self, line: OfLine, table: Table) -> None:
-        self._watch, self.table = line.envelope.itself, table
-
-    @property
-    def itself(self) -> Itself:
-        """What is known of it."""
-        return self._watch.itself
-
-    @itself.setter
-    def itself(self, known: Itself) -> None:
-        self._watch.itself = known
-
-
-class Marching(NamedTuple):
-    """What marches a line: room, and what Newton's method works with."""
-
-    work: Work
-    limits: Limits
-
-
 class Around(NamedTuple):
     """What a run knows of a line beside its states.
 
@@ -169,93 +122,6 @@ class Around(NamedTuple):
     envelope: Envelope | None
     marked: Sequence[tuple[float, int]]
     nearest: np.ndarray
-
-
-class OneOfMany:
-    """A line of several, as changes of its cells see it: the line, its books and the clock of all."""
-
-    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching | None = None) -> None:
-        self._system, self._number, self.switching = run, number, switching
-        line = run.lines[number]
-        self.envelope, self.marked = line.envelope, line.marked
-        self._plane = line.plane
-        self.table = LineTables(*run.solver.tables_by_itself(number))
-        table = line.watch_table
-        self.itself = WatchedLine(line, table) if table is not None else None
-        self.stepper = Marching(run.solver.work[number], run.solver.limits_by_itself(number))
-
-    @property
-    def push(self) -> Floats:
-        """Out of its plane, now; empty: none."""
-        return self.pushes[self.count.parity]
-
-    @property
-    def pushes(self) -> tuple[Floats, Floats]:
-        """Of states of even and of odd parity."""
-        return (NO_PUSH, NO_PUSH) if self._plane is None else self._plane.pushes
-
-    @pushes.setter
-    def pushes(self, pushes: tuple[Floats, Floats]) -> None:
-        if self._plane is not None:
-            self._plane.pushes = pushes
-
-    @property
-    def payout(self) -> PayingOut | None:
-        """Its length, if it is paid out."""
-        return self._system.lines[self._number].paying
-
-    @property
-    def model(self) -> Model:
-        """The line as it is."""
-        return self._system.model.models[self._number]
-
-    @property
-    def books(self) -> Books:
-        """Its books."""
-        return self._system.lines[self._number].books
-
-    @books.setter
-    def books(self, books: Books) -> None:
-        self._system.lines[self._number].books = books
-
-    @property
-    def states(self) -> tuple[State, State]:
-        """Its states of even and of odd parity."""
-        even, odd = self._system.loop.turns
-        return even.lines[self._number], odd.lines[self._number]
-
-    @states.setter
-    def states(self, states: tuple[State, State]) -> None:
-        for each, state in zip(self._system.loop.turns, states, strict=True):
-            cast(list[State], each.lines)[self._number] = state
-
-    @property
-    def clock(self) -> Clock:
-        """Of all lines."""
-        return self._system.loop.clock
-
-    @property
-    def count(self) -> Counts:
-        """Of all lines."""
-        return self._system.loop.counts
-
-    @property
-    def t(self) -> float:
-        """Time, s."""
-        return self._system.t
-
-    @property
-    def outputs_may_wait(self) -> bool:
-        """Whether outputs may wait although the cells that they are of have changed."""
-        return not self._system.asks_quantities and self._system.lines[self._number].outputs_join
-
-    def solver_address(self) -> int:
-        """Of the kernel that marches it."""
-        return self._system.solver.marcher_of(self._number)
-
-    def use_cells_of(self, model: Model, work: Work) -> None:
-        """Go on with the line in other cells, which the run has changed to."""
-        self._system.adopt_cells(self._number, model, work)
 
 
 def ends_alone(batches: Sequence[Batch]) -> Batch:
@@ -378,22 +244,24 @@ class Remesh:
     most_waiting = 0  # lines whose outputs may wait
     per_node = 0  # numbers of a node that are kept for them, at most
 
-    def __init__(self, run: OfRun, number: int, owner: OneOfMany, most: int, marked: int, twice: bool = False) -> None:
+    def __init__(self, run: OfRun, number: int, most: int, marked: int, twice: bool = False) -> None:
         """Room for most cells; `adopt` before the first change.
 
         marked: nodes beside which extremes are kept on both sides; twice: as of `workspace`.
         """
-        self._of_run, self._of_line, self._solver = run, run.lines[number], run.solver
-        self._owner, self.most, self._fixed_to = owner, most, self._key(owner)
-        some = owner.envelope is not None
+        self._run, self._number, self._line, self._solver = run, number, run.lines[number], run.solver
+        # of steps of the line by itself, and of those of all lines by their parity
+        self._alone, self._even, self._odd = run.solver.tables_by_itself(number)
+        self._limits, self.most, self._fixed_to = run.solver.limits_by_itself(number), most, self._key()
+        some = self._line.envelope is not None
         kept, pushes = Packed(lambda n: blank_kept(n, marked, some)), Packed(blank_pushes)
         self._lines = Room(lines, most), Room(lines, most)
         self._states = tuple((Room(states, most), Room(states, most)) for _ in range(2))
         self._pushes, self._kept = (Room(pushes, most), Room(pushes, most)), (Room(kept, most), Room(kept, most))
         self._sea = Room(seas, most)
         self._work = Room(Packed(partial(workspace, keep=twice), given=("torsion",)), most)
-        self._base = np.zeros(owner.books.base.size, np.int64)
-        self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
+        self._base = np.zeros(self._line.books.base.size, np.int64)
+        self._watch_table = self._line.watch_table  # None: nobody watches how near the line comes to itself
         self._itself: Itself = blank_itself(np.zeros(most))
         self._calls, self._at, self._numbers = f.RemeshCalls(), f.RemeshPlaces(), np.zeros(f.NUMBERS)
         self._waiting = np.zeros((self.most_waiting, 3), np.int64)
@@ -403,8 +271,7 @@ class Remesh:
 
     # --- what a planner says ------------------------------------------------------------------------
 
-    @staticmethod
-    def _key(owner: OneOfMany) -> tuple[Any, ...]:
+    def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
         raise NotImplementedError
 
@@ -443,6 +310,16 @@ class Remesh:
     # --- state --------------------------------------------------------------------------------------
 
     @property
+    def model(self) -> Model:
+        """The line as it is."""
+        return self._run.model.models[self._number]
+
+    @property
+    def pushes(self) -> tuple[Floats, Floats]:
+        """Out of its plane, of states of even and of odd parity; empty: none."""
+        return (NO_PUSH, NO_PUSH) if self._line.plane is None else self._line.plane.pushes
+
+    @property
     def side(self) -> int:
         """Which of the two sets of arrays is in use."""
         return int(self._at.side)
@@ -460,14 +337,13 @@ class Remesh:
     @property
     def fits(self) -> bool:
         """Whether the line is solved by what the arrays were made for."""
-        watched = self._owner.itself.table if self._owner.itself is not None else None
-        same = self._solver is self._of_run.solver and self._of_line.watch_table is watched
-        return bool(same and self._fixed_to == self._key(self._owner))
+        same = self._solver is self._run.solver and self._line.watch_table is self._watch_table
+        return bool(same and self._fixed_to == self._key())
 
     @property
     def job(self) -> np.ndarray:
         """The table of kernels.mesh.remesh that the compiled steps get."""
-        self._at.alone, self._at.may_wait = self.alone, self._owner.outputs_may_wait
+        self._at.alone, self._at.may_wait = self.alone, not self._run.asks_quantities and self._line.outputs_join
         return self._table.numbers
 
     # --- arrays -------------------------------------------------------------------------------------
@@ -492,7 +368,7 @@ class Remesh:
 
     def line(self, k: int, cells: int) -> Line:
         """The line of side k."""
-        line = self._owner.model.line
+        line = self.model.line
         found: Line = self._view(self._lines[k], cells, {"bits": line.bits, "plane": line.plane, **NO_LAWS})
         return found
 
@@ -503,32 +379,32 @@ class Remesh:
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
-        if not self._owner.push.size:
+        if not self.pushes[0].size:
             return NO_PUSH
         found: Floats = self._view(self._pushes[k], cells)[which]
         return found
 
     def _sea_on(self, cells: int) -> Sea:
-        values = self._owner.model.sea.values
+        values = self.model.sea.values
         found: Sea = self._view(self._sea, cells, {x: getattr(values, x) for x in REST_OF_SEA})
         return found
 
     def _work_on(self, cells: int) -> Work:
-        found: Work = self._view(self._work, cells, {"torsion": self._owner.stepper.work.torsion})
+        found: Work = self._view(self._work, cells, {"torsion": self._solver.work[self._number].torsion})
         return found
 
     def _books(self, k: int, cells: int) -> Books:
         if not self._binding:
-            return self._owner.books._replace(base=self._base, **self._kept[k].view(cells)._asdict())
+            return self._line.books._replace(base=self._base, **self._kept[k].view(cells)._asdict())
         if (Books, k, cells) not in self._views:
             kept = self._view(self._kept[k], cells)._asdict()
-            self._views[Books, k, cells] = self._owner.books._replace(base=self._base, **kept)
+            self._views[Books, k, cells] = self._line.books._replace(base=self._base, **kept)
         found: Books = self._views[Books, k, cells]
         return found
 
     def _width(self, cells: int) -> Floats:
         """Diameters of cells; none where nobody watches whether the line meets itself."""
-        return self._itself.width[: cells if self._watch is not None else 0]
+        return self._itself.width[: cells if self._watch_table is not None else 0]
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -549,7 +425,7 @@ class Remesh:
 
     def _bind_all(self) -> None:
         """Tables of changes from either side to the other, and of runs on either."""
-        owner, at, (beside, blank) = self._owner, self._at, self._beside_table()
+        run, at, books, (beside, blank) = self._run, self._at, self._line.books, self._beside_table()
         of_run, of_odd = (shaped(blank_job, x, *BOTH) for x in (self._in_run, self._in_odd))
         of_beside = shaped(blank, self._in_beside, *BOTH)
         change, parts, at.begun = self._tables_of_change()
@@ -560,10 +436,10 @@ class Remesh:
             "in_itself": np.zeros((2, 3, 0), np.int64),
         }  # fmt: skip
         of_itself: list[Shaped] = []
-        if self._watch is not None:
+        if self._watch_table is not None:
             of_itself = shaped(blank_itself_job, self._in_itself, *BOTH)
             places = of_itself[0].places(IN_ITSELF)
-            numbers["itself"], numbers["itself_places"] = self._watch.table.numbers, places
+            numbers["itself"], numbers["itself_places"] = self._watch_table.numbers, places
             numbers["in_itself"] = np.array([x.numbers[:, places] for x in of_itself])
             tree = self._itself.tree.__array_interface__["data"][0]
             at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
@@ -571,49 +447,51 @@ class Remesh:
         calls = [(p.kernel.address(change[p.table][0].table.numbers), *ends[p.table : p.table + 2]) for p in parts]
         self._tables = of_run, of_odd, of_beside, of_itself, change, planners  # what is bound there stays alive
         self._table.bind(
-            calls=self._calls, at=at, clock=owner.clock, own=owner.books.clock, counts=owner.count,
-            work=owner.books.work, numbers=self._numbers, planners=np.array([x.numbers for x in planners]),
+            calls=self._calls, at=at, clock=run.loop.clock, own=books.clock, counts=run.loop.counts,
+            work=books.work, numbers=self._numbers, planners=np.array([x.numbers for x in planners]),
             parts=np.array(calls, np.int64), change=np.zeros(ends[-1], np.int64),
             changed=np.array([np.concatenate([x[pair].numbers for x in change], axis=1) for pair in range(len(PAIRS))]),
-            run=owner.table.numbers, run_places=in_run, in_run=np.array([x.numbers[:, in_run] for x in of_run]),
-            even=owner.table.even.numbers, odd=owner.table.odd.numbers,
+            run=self._alone.numbers, run_places=in_run, in_run=np.array([x.numbers[:, in_run] for x in of_run]),
+            even=self._even.numbers, odd=self._odd.numbers,
             in_odd=np.array([x.numbers[:, in_run] for x in of_odd]), beside=beside.numbers, beside_places=in_beside,
             in_beside=np.array([x.numbers[:, in_beside] for x in of_beside]), waiting=self._waiting, **numbers,
         )  # fmt: skip
-        at.task, at.per_node = owner.table.part("task").start, self.per_node
+        at.task, at.per_node = self._alone.part("task").start, self.per_node
         for name, kernel in (("due", due), ("plan", plan), ("keep", keep)):
             setattr(self._calls, name, kernel.address(planners[0].numbers))
         for name, kernel in (("before_forces", before_forces), ("after_forces", after_forces), ("books", begin_line)):
-            setattr(self._calls, name, kernel.address(owner.table.numbers))
+            setattr(self._calls, name, kernel.address(self._alone.numbers))
 
     # --- steps --------------------------------------------------------------------------------------
 
     def adopt(self) -> None:
         """Go on with the line of the run as it is now, in these arrays."""
-        owner, model, n = self._owner, self._owner.model, self._owner.model.cells
+        model, n, work = self.model, self.model.cells, self._solver.work[self._number]
         if not self._bound:
             with self._binds():
                 self._bind_all()
             self._bound = True
         self._at.side, self._at.cells = 0, n
-        parity = int(owner.count.parity)
-        for which in (0, 1):
-            copy_fields(owner.states[which], self.state(0, which, n), ("turn",))
-            if owner.push.size:
-                self._push(0, which, n)[:] = owner.pushes[which]
+        counts, books, pushes = self._run.loop.counts, self._line.books, self.pushes
+        parity = int(counts.parity)
+        for which, turn in enumerate(self._run.loop.turns):
+            copy_fields(turn.lines[self._number], self.state(0, which, n), ("turn",))
+            if pushes[which].size:
+                self._push(0, which, n)[:] = pushes[which]
         copy_fields(model.line, self.line(0, n), ("bits", "plane", *NO_LAWS))
         copy_fields(model.sea.values, self._sea_on(n), REST_OF_SEA)
-        copy_fields(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
-        self._base[:] = owner.books.base
-        if self._watch is not None:
-            copy_fields(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
-        copy_fields(owner.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
+        copy_fields(work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        self._base[:] = books.base
+        if self._watch_table is not None:
+            itself = self._line.envelope.itself.itself
+            copy_fields(itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
+        copy_fields(books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
         self._copy_beside(n)
-        owner.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._calls.solver = owner.solver_address()
+        self._alone.bind(task=Task(RUN, ca=HEAVY, limits=self._limits))
+        self._calls.solver = self._solver.marcher_of(self._number)
         f.put_cells(self._table.numbers)
         self.adopted, self._synced = True, -1
-        owner.count.parity = parity
+        counts.parity = parity
         self.sync()
 
     def sync(self) -> None:
@@ -621,23 +499,26 @@ class Remesh:
         if self._at.changes == self._synced:
             return
         self._synced = int(self._at.changes)
-        owner, k, n = self._owner, self.side, self.cells
+        k, n = self.side, self.cells
         line, sea, work, books = self.line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n)
         now = sea.now.copy()
         model = self._model_of(line, sea)
         sea.now[:] = now
-        old, new = self.state(k, 0, n), self.state(k, 1, n)
-        owner.books, owner.states = books, (old, new)
-        owner.pushes = self._push(k, 0, n), self._push(k, 1, n)
-        owner.table.hold(
-            line=line, sea=sea, old=old, new=new, was=owner.pushes[0], now=owner.pushes[1], work=work, books=books,
-        )  # fmt: skip
+        old, new = states = self.state(k, 0, n), self.state(k, 1, n)
+        self._line.books = books
+        for turn, state in zip(self._run.loop.turns, states, strict=True):
+            cast(list[State], turn.lines)[self._number] = state
+        was, now_ = pushes = self._push(k, 0, n), self._push(k, 1, n)
+        if self._line.plane is not None:
+            self._line.plane.pushes = pushes
+        for table, (before, after) in ((self._alone, states), (self._even, states), (self._odd, (new, old))):
+            table.hold(line=line, sea=sea, old=before, new=after, was=was, now=now_, work=work, books=books)
         self._beside_table()[0].hold(**self._in_beside(k, n, n))
-        if self._watch is not None:
+        if self._watch_table is not None:
             itself = self._itself._replace(width=self._width(n), tree=self._itself.tree[: boxes_of(n)])
-            self._watch.itself = itself
-            self._watch.table.hold(line=line, old=old, new=new, itself=itself)
-        owner.use_cells_of(model, work)
+            self._line.envelope.itself.itself = itself
+            self._watch_table.hold(line=line, old=old, new=new, itself=itself)
+        self._run.adopt_cells(self._number, model, work)
 
     # --- outputs that wait --------------------------------------------------------------------------
 
@@ -645,11 +526,11 @@ class Remesh:
         """All outputs that wait, in rows, copied, each with its line; and what they have at the ends."""
         begin, found, batches = 0, list[Output](), list[Batch]()
         for first, count, cells in self._waiting[: self._at.waiting].tolist():
-            batches.append(self._of_line.batch_of(rows[first : first + count], cells))
+            batches.append(self._line.batch_of(rows[first : first + count], cells))
             outputs, begin = self._outputs_of(batches[-1], cells, begin)
             found += outputs
         if len(rows) > self._at.used:
-            batches.append(self._of_line.batch_of(rows[self._at.used :], self._owner.model.cells))
+            batches.append(self._line.batch_of(rows[self._at.used :], self.model.cells))
             found += self._outputs_now(batches[-1])
         self._at.waiting = self._at.placed = self._at.used = 0
         return found, ends_alone(batches)

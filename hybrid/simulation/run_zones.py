@@ -95,7 +95,7 @@ class _LineZones:
     """What moves the zones of one line, with the numbers of a compiled run (kernels.mesh.zone_step)."""
 
     def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
-        self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager, followed=True)
+        self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager)
         self.clock, self.counts = b.Clock(), Counts()
         longest, clock = LONGEST_IN_RAMP * manager.ramp_time * every, manager.zones.clock
         clock.ramp_step, clock.steady_step = longest, longest * READY
@@ -280,7 +280,7 @@ class RunZones(Part):
             model = on_layout(models[k], _saved_layout(layout, mine))
             assert model.layout is not None
             manager.set_layout(model.layout)
-            x.switching, x.pending = ZoneSwitching(model, manager, followed=True), None
+            x.switching, x.pending = ZoneSwitching(model, manager), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
             run.lines[k].use_cells(model, extremes=False)
@@ -469,8 +469,8 @@ class LineKinds:
         )
         (first, second), base = states, np.zeros(layout.rod.size)
         transfer = Transfer(
-            self._before, line, second, first, layout.places, layout.places, layout.base_of_cell, layout.first,
-            switching.kinks, base, self._clamps, self._held, np.ones(1, bool), blank_match(model.cells, model.cells),
+            self._before, line, second, first, layout.places, layout.places, layout.first,
+            switching.kinks, self._clamps, self._held, np.ones(1, bool), blank_match(model.cells, model.cells),
         )  # fmt: skip
         self._keeps = zones.keeps.copy()  # of the kinds before
         self._switch.bind(
@@ -501,10 +501,7 @@ class LineKinds:
         self._keeps[:] = switching.zones.keeps
         layout = model.layout._replace(rod=change.rod.copy())
         self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.layout.base_of_cell]
-        for k, clamp in enumerate(switching.clamps(self._ends)):
-            self._held[k] = clamp is not None
-            if clamp is not None:
-                self._clamps[k] = clamp
+        self._clamps[:], self._held[:] = switching.clamps(self._ends)
         numbers[TIME], numbers[RELAXES] = t, switching.zones.counts.relaxing
         fill_line(self._fill.numbers)
         clear_state(self._renew.numbers)

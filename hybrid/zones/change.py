@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +21,6 @@ from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import (
     REJECT_RATIO,
     Zones,
-    advance_zones,
     blank_zone_job,
     blank_zones,
     plan_nodes,
@@ -58,8 +57,8 @@ def on_layout(model: Model, layout: Layout) -> Model:
 
 # From the old zones to the new ones: the state on their nodes (kernels.mesh.zone_transfer).
 
-Clamp = tuple[Floats, Floats]  # first director and tangent
 states = Packed(blank_state, given=("turn", "slow", "wake", "peak", "grip", "sheave", "soil"))
+NO_CLAMPS = np.zeros((2, 2, 3)), np.zeros(2, bool)
 
 
 def transfer_to(
@@ -69,20 +68,14 @@ def transfer_to(
     target: Line,
     state: State,
     kinks: np.ndarray,
-    twist: Floats,
-    clamps: Sequence[Clamp | None] = (None, None),
+    clamps: tuple[Floats, np.ndarray] = NO_CLAMPS,
     shifts: bool = True,
 ) -> Transfer:
     """What carries a state from one layout to another of the same base.
 
     line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
-    loads); twist: (n,) 1/m, twist to give to the frames of base cells that become rod; clamps: first director and
-    tangent of what holds the twist of the two ends, None: nothing does; shifts: whether momentum is kept exactly.
+    loads); clamps: as of `ZoneSwitching.clamps`; shifts: whether momentum is kept exactly.
     """
-    held, frames = np.zeros(2, bool), np.zeros((2, 2, 3))
-    for k, clamp in enumerate(clamps):
-        if clamp is not None:
-            held[k], frames[k] = True, clamp
     out = states(
         target.h.size,
         turn=np.zeros((len(target.torsion), 3)),
@@ -94,17 +87,16 @@ def transfer_to(
         soil=np.zeros((len(state.soil) and target.h.size + 1, state.soil.shape[1])),
     )
     return Transfer(
-        line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
-        frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),
+        line, target, state, out, old.places, new.places, old.first, kinks, *clamps, np.array([shifts]),
+        blank_match(line.h.size, target.h.size),
     )  # fmt: skip
 
 
 class ZoneSwitching:
     """The zones of one motion."""
 
-    def __init__(self, model: Model, manager: DomainManager, followed: bool = False) -> None:
-        """followed: whether others follow the zones around every try and step, whatever is compiled."""
-        self.model, self.manager, self._followed = model, manager, followed
+    def __init__(self, model: Model, manager: DomainManager) -> None:
+        self.model, self.manager = model, manager
         self.table = Table(blank_zone_job)  # of the compiled run
         self._switch_table, self._plan_table = Table(blank_switch_job), Table(blank_zone_job)
         self._review = Table(blank_review_job)
@@ -156,10 +148,6 @@ class ZoneSwitching:
         """Steps are as long as what is ramped allows."""
         clock = self.zones.clock
         of_run.allowed = clock.ramp_step if self.manager.ramping else clock.steady_step
-
-    def torque(self) -> float:
-        """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
-        return float(self.manager.torque)
 
     def checkpoint(self) -> dict[str, Any]:
         """What is under way: bending, lengths, and what the manager remembers."""
@@ -222,7 +210,6 @@ class ZoneSwitching:
         """
         line, manager, most = self.model.line, self.manager, MOST_RESCUES
         if how.outcome == Outcome.OK:
-            self._update_criteria()
             if manager.user is not None:
                 manager.ask_user(line, tried, end)
             cells = manager.cells_to_reject if manager.highest_ratio > REJECT_RATIO else NONE
@@ -235,11 +222,6 @@ class ZoneSwitching:
             why = f"a step failed here ({how.outcome.cause}); it is repeated"
             most = 1  # after that, a smaller step
         return self._force_rod(cells, why) if rescues < most and cells.size else None
-
-    def _update_criteria(self) -> None:
-        """After a try, or a step, that nobody else has followed."""
-        if not (self.compiled or self._followed):
-            advance_zones(self.table.numbers)
 
     def all_rod(self, how: Tried) -> Change | None:
         """The last resort of a step that fails however small: rod wherever the scene lets it be; None: it is."""
@@ -254,7 +236,6 @@ class ZoneSwitching:
     def book_step(self, t: float, state: State) -> Change | None:
         """After an accepted step: what should change."""
         manager = self.manager
-        self._update_criteria()
         change = manager.review(t, state) if manager.review_due(t) else None
         if change is None and self.zones.counts.cells_due:
             change = manager.same_zones()
@@ -276,7 +257,8 @@ class ZoneSwitching:
         changed = on_layout(model, new)
         changed.sea.at_time(t)  # obstacles stand where they are now
         target, numbers = changed.line, np.zeros(NUMBERS)
-        transfer = self._transfer(old, new, line, target, ends, state)
+        shifts = not self.zones.clock.share > 0.0
+        transfer = transfer_to(old, new, line, target, state, self.kinks, self.clamps(ends), shifts)
         numbers[TIME], numbers[RELAXES] = t, before.counts.relaxing
         self._switch_table.bind(
             transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values, zones=before, target_zones=before,
@@ -317,19 +299,11 @@ class ZoneSwitching:
         plan_nodes(self._plan_table.numbers)
         return zones.plan.copy()
 
-    def clamps(self, ends: Ends) -> list[Clamp | None]:
-        """First director and tangent of what holds the twist of the two ends; None: nothing does."""
-        cable, frames = self.model.cable, ends.frame.reshape(2, 3, 3)
-        return [
-            (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None
-            for k in (0, 1)
-        ]
-
-    def _transfer(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Transfer:
-        """What carries the state to the new nodes."""
-        none = np.zeros(new.rod.size)
-        shifts = not self.zones.clock.share > 0.0
-        return transfer_to(old, new, line, target, state, self.kinks, none, self.clamps(ends), shifts)
+    def clamps(self, ends: Ends) -> tuple[Floats, np.ndarray]:
+        """First directors and tangents (2, 2, 3) of what holds the twist of ends; (2,) whether anything does."""
+        cable = self.model.cable
+        held = np.array([cable.held_twist[k] and cable.held_tangent[k] for k in (0, 1)], bool)
+        return ends.frame.reshape(2, 3, 3)[:, :, ::2].transpose(0, 2, 1).copy(), held
 
 
 # The base cells of a line change while it is paid out: what the domain manager remembers of those that stay.

@@ -88,7 +88,7 @@ def first_zones(cable: Material, layout: Layout, allowed: Allowed, times: Times)
     )
     clock = zones.clock
     clock.share, clock.fineness, clock.tolerance = allowed.curvature_error or 0.0, allowed.fineness, allowed.tolerance
-    clock.left, clock.ramp_time = 1.0, times.ramp or times.hold
+    clock.ramp_time = times.ramp or times.hold
     clock.edge_time = clock.ramp_time if times.edge is None else times.edge
     clock.memory = FADE * max(clock.ramp_time, times.period)
     for quantity, part in allowed.asked.items():

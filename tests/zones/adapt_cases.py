@@ -14,7 +14,7 @@ import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
+from hybrid.kernels.mesh.zone_transfer import transfer
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
@@ -143,15 +143,6 @@ class Remapped(NamedTuple):
     lengths: Floats
 
 
-def remap(
-    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, twist: Floats,
-) -> Remapped:  # fmt: skip
-    """Carry a state: arguments as of transfer_to."""
-    job = transfer_to(old, new, line, target, state, kinks, twist)
-    transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)
-    return Remapped(job.out, job.match.lengths)
-
-
 def carried(
     what: Material, old: Layout, rod: Sequence[bool] | str, state: State, line: Line | None = None
 ) -> tuple[Layout, Line, Remapped]:
@@ -160,7 +151,9 @@ def carried(
     target = on(what, new)
     kinks = np.zeros(old.rod.size + 1, bool)
     kinks[np.searchsorted(old.base, what.at - 1e-9 * old.base[-1])] = True
-    return new, target, remap(old, new, line or on(what, old), target, state, kinks, np.zeros(old.rod.size))
+    job = transfer_to(old, new, line or on(what, old), target, state, kinks)
+    transfer(Table(job).numbers)
+    return new, target, Remapped(job.out, job.match.lengths)
 
 
 def moved(line: Line, state: State) -> Floats:

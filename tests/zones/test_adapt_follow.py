@@ -378,7 +378,7 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
     left, change = [], CellChanges.change
 
     def measured(self: CellChanges, *given) -> float:
-        k, n, parity = self.side, self.cells, int(self._owner.count.parity)
+        k, n, parity = self.side, self.cells, int(self._run.loop.counts.parity)
         line, state = self.line(k, n), self.state(k, parity, n)
         size, before = line.mass.sum() * np.linalg.norm(state.v, axis=1).max(), line.mass @ state.v
         booked = change(self, *given)

@@ -24,7 +24,6 @@ from adapt_cases import (
     layout,
     moved,
     on,
-    remap,
     state_on,
     turns,
     twists,
@@ -365,14 +364,3 @@ def test_closing_twist_is_spread_evenly(angle):
     assert twist[gap] == pytest.approx(angle / gap.size, abs=1e-12)
     rest = np.flatnonzero(new.rod_cells[:-1] & new.rod_cells[1:])
     assert np.abs(twist[np.setdiff1d(rest, gap)]).max() < 1e-12
-
-
-def test_intrinsic_twist_is_followed():
-    """`twist` asks for a twist of the frames per length; it is had between all new cells."""
-    what, old = cable(), even(8, "C" * 8)
-    line = on(what, old)
-    state = state_on(line, SHAPES["helix"][0])
-    new = old._replace(rod=np.ones(8, bool))
-    target = on(what, new)
-    out = remap(old, new, line, target, state, np.zeros(9, bool), np.full(8, 0.3))
-    assert twists(out.state) == pytest.approx(0.3 * target.hn[1:-1], rel=1e-10)

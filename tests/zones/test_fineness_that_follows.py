@@ -15,7 +15,7 @@ from hybrid.accuracy.passes import free_in
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_criteria import EDGE
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
-from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
+from hybrid.kernels.mesh.zone_transfer import transfer
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, no_sea
 from hybrid.model.resolution import wants_survey
@@ -120,8 +120,8 @@ def test_new_nodes_have_the_curvature_of_the_line(follows: bool) -> None:
     line, target = on(what, old), on(what, new)
     change = 1e-3  # of the curvature, 1/m2
     state = state_on(line, lambda s: np.column_stack([s, 0.0 * s, change * (s - 2.0) ** 3 / 6.0]))
-    job = transfer_to(old, new, line, target, state, np.zeros(6, bool), np.zeros(5), shifts=not follows)
-    transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)
+    job = transfer_to(old, new, line, target, state, np.zeros(6, bool), shifts=not follows)
+    transfer(Table(job).numbers)
     s, z = new.nodes, job.out.r[:, 2]
     bend = 2.0 * np.diff(np.diff(z) / np.diff(s)) / (s[2:] - s[:-2])
     place = (s[:-2] + s[1:-1] + s[2:]) / 3.0  # that a second divided difference belongs to

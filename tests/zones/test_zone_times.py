@@ -184,7 +184,7 @@ def rescued(outcome: Outcome, rescues: int, slack: int = -1) -> list[int]:
     tried.T[:] = model.slack_floor + 1.0
     if slack >= 0:
         tried.T[slack] = model.slack_floor
-    switching = ZoneSwitching(model, found, followed=True)
+    switching = ZoneSwitching(model, found)
     change = switching.rescue(Tried(outcome, 5, 1.0, 11), 1.0, 0.1, tried, rescues)
     return [] if change is None else np.flatnonzero(change.rod).tolist()
 

@@ -38,7 +38,6 @@ from hybrid.kernels.contact.self_contact_pairs import (
     RETURNS,
     SLIP_WITHIN,
     Contact,
-    blank_contact,
     farthest_from_mean,
     find_points,
     foresee_nearness,
@@ -53,11 +52,7 @@ from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import caller_of_six, reader
 from hybrid.kernels.march.energies import Observed, find_powers, loses, observe
 from hybrid.kernels.march.zone_torque import twist_energy
-from hybrid.kernels.state.books import (
-    RATES,
-    Clock,
-    Counts,
-)
+from hybrid.kernels.state.books import RATES, Clock, Counts
 from hybrid.kernels.state.report import (
     AXIAL_LAW,
     CONTACT_WORK,
@@ -66,7 +61,6 @@ from hybrid.kernels.state.report import (
     LOST_WORK,
     NET_A,
     OBSTACLE_WORK,
-    REPORT_SIZE,
     ROTARY,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
@@ -74,19 +68,7 @@ from hybrid.kernels.state.report import (
     STRETCH_ENERGY,
     TOUCHES,
 )
-from hybrid.kernels.state.state import (
-    NO_CARRIED,
-    NO_ROOM,
-    Ends,
-    Floats,
-    Line,
-    State,
-    Work,
-    blank_line,
-    blank_state,
-    no_ends,
-    no_work,
-)
+from hybrid.kernels.state.state import Blocks, Ends, Line, Rows, State, Work, blanks
 from hybrid.kernels.step.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.step.step_control import before_fixed, radius_of_step, scheme
 
@@ -240,25 +222,15 @@ class ContactJob(NamedTuple):
     counts: Counts
     call: NDArray[np.int64]
     contact: Contact
-    touch: Floats  # (3, N+1) as kernels.state.books.Books has it, and so have
-    velocity: Floats  # (2, 3) m/s
-    power: Floats  # (2, RATES) W
-    report: Floats  # (3, REPORT_SIZE)
-    carried: Floats  # of kernels.state.state.Sea, where a sheave turns freely; else empty
-    rolling: Floats
+    touch: Rows  # (3, N+1) as kernels.state.books.Books has it, and so have
+    velocity: Rows  # (2, 3) m/s
+    power: Rows  # (2, RATES) W
+    report: Rows  # (3, REPORT_SIZE)
+    carried: Rows  # of kernels.state.state.Sea, where a sheave turns freely; else empty
+    rolling: Blocks
 
 
-def blank_contact_job() -> ContactJob:
-    """A job with the types that every one has."""
-    state = blank_state(1)
-    clock, counts = Clock(), Counts()
-    call = np.zeros(3, np.int64)
-    return ContactJob(
-        blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1),
-        np.zeros((3, 2)), np.zeros((2, 3)), np.zeros((2, RATES)), np.zeros((3, REPORT_SIZE)), NO_CARRIED, NO_ROOM,
-    )  # fmt: skip
-
-
+blank_contact_job = blanks(ContactJob)
 read = reader(blank_contact_job())
 
 

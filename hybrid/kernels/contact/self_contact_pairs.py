@@ -44,7 +44,7 @@ from hybrid.kernels.contact.self_distance import (
     runs_on,
 )
 from hybrid.kernels.machine.compile import called, inner
-from hybrid.kernels.machine.references import NamedNumbers
+from hybrid.kernels.machine.references import NamedNumbers, by_reference
 from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import LIMIT, TOUCH
@@ -192,6 +192,9 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False, lines: in
         holds=z((held, HOLD)), arms=z((held, 4, ARM)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
         links=z(held, np.int64),
     )  # fmt: skip
+
+
+by_reference(blank_contact(1))
 
 
 @inner

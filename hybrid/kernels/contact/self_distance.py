@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.references import NamedNumbers, reader
+from hybrid.kernels.machine.references import NamedNumbers, by_reference, reader
 from hybrid.kernels.state.books import Clock, Counts
-from hybrid.kernels.state.state import Ends, Floats, Line, State, blank_line, blank_state, no_ends
+from hybrid.kernels.state.state import Ends, Floats, Line, State, blanks
 
 # Distance of two points over the length of line between them below which they are no neighbours: half a circle has
 # 0.64, and two diameters of contact leave a loop of 2.5 diameters.
@@ -116,6 +116,9 @@ def blank_itself(width: Floats) -> Itself:
     return Itself(width, np.zeros((boxes_of(width.size), BOX)), stack, found, np.full(2, -1, np.int64), ahead)
 
 
+by_reference(blank_itself(np.ones(1)))
+
+
 class ItselfJob(NamedTuple):
     """Arguments of the entry: two states in turn as kernels.run.network_run has them, its clock and counts."""
 
@@ -128,13 +131,7 @@ class ItselfJob(NamedTuple):
     itself: Itself
 
 
-def blank_itself_job() -> ItselfJob:
-    """A job with the types that every one has."""
-    state, itself = blank_state(1), blank_itself(np.ones(1))
-    clock, counts = Clock(), Counts()
-    return ItselfJob(blank_line(1), no_ends(), state, state, clock, counts, itself)
-
-
+blank_itself_job = blanks(ItselfJob)
 read = reader(blank_itself_job())
 
 

@@ -14,8 +14,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from hybrid.kernels.algebra.rotations import (
     add,
     cross,
@@ -35,7 +33,6 @@ from hybrid.kernels.algebra.rotations import (
 from hybrid.kernels.laws.water import (
     ALONG,
     MIDDLE,
-    PIECE,
     PUSH,
     WATER,
     WET,
@@ -46,7 +43,7 @@ from hybrid.kernels.laws.water import (
 )
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.state import Floats, Sea, no_sea
+from hybrid.kernels.state.state import Floats, Rows, Sea, blanks
 
 # Numbers of a state; the motion of the origin, m, then that of the rotation, rad.
 PLACE = 0  # 3, origin, m
@@ -399,22 +396,17 @@ class MembersJob(NamedTuple):
     """Pieces of the members of a body, n of them."""
 
     sea: Sea  # with room for n places; at the time that is asked
-    pieces: Floats  # (n, PIECE)
-    sizes: Floats  # (n, 3) added mass across it (kg), length, diameter (m)
-    places: Floats  # (n, 3) m, worked in
-    still: Floats  # (n, 3) of zeros
+    pieces: Rows  # (n, PIECE)
+    sizes: Rows  # (n, 3) added mass across it (kg), length, diameter (m)
+    places: Rows  # (n, 3) m, worked in
+    still: Rows  # (n, 3) of zeros
     state: Floats  # (STATE,) of the body, from which it goes on
     dt: Floats  # (1,) s
     waves: Floats  # (1,) 1 where they count
-    out: Floats  # (n, PIECE) of which wetness and water are written
+    out: Rows  # (n, PIECE) of which wetness and water are written
 
 
-def blank_members_job() -> MembersJob:
-    """A job with the types that every one has."""
-    z = np.zeros
-    return MembersJob(no_sea(1), z((1, PIECE)), z((1, 3)), z((1, 3)), z((1, 3)), z(STATE), z(1), z(1), z((1, PIECE)))
-
-
+blank_members_job = blanks(MembersJob)
 read_members = reader(blank_members_job())
 
 

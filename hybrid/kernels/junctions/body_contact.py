@@ -25,20 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.rotations import add, cross, get3, madd, mat_mat, mat_vec, mscale, msub, sub, vector
-from hybrid.kernels.junctions.bodies import (
-    FRAME,
-    LINES,
-    PLACE,
-    SOFTEST,
-    SPRING,
-    U,
-    V,
-    W,
-    X,
-    matrix,
-)
+from hybrid.kernels.junctions.bodies import FRAME, LINES, PLACE, SOFTEST, SPRING, U, V, W, X, matrix
 from hybrid.kernels.junctions.borders import (
     AGAIN,
     BEFORE_MARCH,
@@ -75,7 +63,7 @@ from hybrid.kernels.state.report import (
     TURNING,
 )
 from hybrid.kernels.state.report import PLACE as CENTRE
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Blocks, Rows, blanks
 from hybrid.kernels.step.newton import CORRECTION, read
 
 # Columns of a node that touches a body.
@@ -97,27 +85,19 @@ class MeetingJob(NamedTuple):
     carriers: NDArray[np.int64]  # (S,) the body of each slot
     slots: NDArray[np.int64]  # (B,) the slot of each body; -1: it has no shape
     found: NDArray[np.int64]  # (1 + S,) nodes that touch, and those that touch each body
-    touched: Floats  # (T M, TOUCHED)
-    own: Floats  # (S, 36) R
-    wrench: Floats  # (S, 6) W
-    kept: Floats  # (T, 5) corrections of lines without P and Q
-    moved: Floats  # (B, 6) and of bodies
-    responses: Floats  # (12 S, T, 5) of lines
-    turned: Floats  # (12 S, B, 6) of bodies
-    coupling: Floats  # (12 S, 12 S + 1)
+    touched: Rows  # (T M, TOUCHED)
+    own: Rows  # (S, 36) R
+    wrench: Rows  # (S, 6) W
+    kept: Rows  # (T, 5) corrections of lines without P and Q
+    moved: Rows  # (B, 6) and of bodies
+    responses: Blocks  # (12 S, T, 5) of lines
+    turned: Blocks  # (12 S, B, 6) of bodies
+    coupling: Rows  # (12 S, 12 S + 1)
     order: NDArray[np.int64]  # (12 S,) exchanges of its rows
     rank: int = 0
 
 
-def blank_meeting_job() -> MeetingJob:
-    """A job with the types that every one has."""
-    z, one = np.zeros, np.zeros(1, np.int64)
-    return MeetingJob(
-        one, one, one, one, z((1, TOUCHED)), z((1, 36)), z((1, 6)), z((2, SIZE)), z((1, 6)), z((EACH_BODY, 2, SIZE)),
-        z((EACH_BODY, 1, 6)), z((EACH_BODY, EACH_BODY + 1)), one,
-    )  # fmt: skip
-
-
+blank_meeting_job = blanks(MeetingJob)
 read_meeting = reader(blank_meeting_job())
 
 

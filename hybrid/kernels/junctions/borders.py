@@ -25,6 +25,7 @@ from hybrid.kernels.junctions.joined_lines import last_block
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.state.state import blanks
 from hybrid.kernels.step.newton import read
 
 START, END = 0, 1
@@ -62,11 +63,7 @@ class BorderJob(NamedTuple):
     rank: int = 0  # how many borders are before it
 
 
-def blank_border_job() -> BorderJob:
-    """A job with the types that every one has."""
-    return BorderJob(np.zeros(1, np.int64))
-
-
+blank_border_job = blanks(BorderJob)
 read_border = reader(blank_border_job())
 
 

@@ -63,7 +63,7 @@ from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.newton import (
     ASKED,
     FIND,
@@ -90,27 +90,19 @@ MEETING = 3
 class SharedJob(NamedTuple):
     """Arguments of the entry; K lines that may touch, with N+1 nodes."""
 
-    tables: NDArray[np.int64]  # (L, ..) jobs of all lines of the system
+    tables: NumberRows  # (L, ..) jobs of all lines of the system
     lines: NDArray[np.int64]  # (K,) numbers of those that may touch
     begins: NDArray[np.int64]  # (K,) where their nodes begin
     starts: Floats  # (K,) m, their arc lengths as parts of the one line, less their own
-    joints: NDArray[np.int64]  # (L, 2) as kernels.junctions.network_job.NetworkJob has it
+    joints: NumberRows  # (L, 2) as kernels.junctions.network_job.NetworkJob has it
     inner: NDArray[np.int64]  # table of a ContactJob of them as one line
-    pushes: Floats  # (2, N+1, 4) N, N m, forces of other lines on nodes, moments on cells
-    shares: Floats  # (2, K, SHARES) of Contact, likewise
+    pushes: Blocks  # (2, N+1, 4) N, N m, forces of other lines on nodes, moments on cells
+    shares: Blocks  # (2, K, SHARES) of Contact, likewise
     times: Floats  # (2,) s, of what state these are
-    meetings: Floats  # (K, K, MEETING)
+    meetings: Blocks  # (K, K, MEETING)
 
 
-def blank_shared_job() -> SharedJob:
-    """A job with the types that every one has."""
-    z, whole = np.zeros, np.int64
-    return SharedJob(
-        z((1, 1), whole), z(1, whole), z(1, whole), z(1), z((1, 2), whole), z(1, whole), z((2, 1, 4)), z((2, 1, SHARES)),
-        z(2), z((1, 1, MEETING)),
-    )  # fmt: skip
-
-
+blank_shared_job = blanks(SharedJob)
 read_shared = reader(blank_shared_job())
 
 
@@ -317,21 +309,16 @@ class TouchingJob(NamedTuple):
     """Arguments of the entry; L lines, T nodes of all lines."""
 
     system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
-    shared: NDArray[
-        np.int64
-    ]  # (L, 2) the line that has the contact of a line (-1: none has), where its nodes begin there
-    contacts: NDArray[np.int64]  # (L, ..) tables of kernels.contact.self_contact.ContactJob, of lines that have contact
-    kept: Floats  # (T, 5) corrections of lines without contact
-    moved: Floats  # (B, 6) and of bodies
-    hessenberg: Floats  # as kernels.contact.self_contact_pairs.Contact has it
+    shared: NumberRows  # (L, 2) the line that has the contact of a line (-1: none has), where its nodes begin there
+    contacts: NumberRows  # (L, ..) tables of kernels.contact.self_contact.ContactJob, of lines that have contact
+    kept: Rows  # (T, 5) corrections of lines without contact
+    moved: Rows  # (B, 6) and of bodies
+    hessenberg: Rows  # as kernels.contact.self_contact_pairs.Contact has it
     rests: NDArray[np.int64]  # (1,) 1: of a state in which no step is tried
     rank: int = 0
 
 
-def blank_touching_job() -> TouchingJob:
-    """A job with the types that every one has."""
-    z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
-    return TouchingJob(one, two, two, z((2, SIZE)), z((1, 6)), room_for_products(), one)
+blank_touching_job = blanks(TouchingJob)
 
 
 def room_for_products() -> Floats:

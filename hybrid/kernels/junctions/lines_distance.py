@@ -25,7 +25,7 @@ from hybrid.kernels.contact.self_distance import NEIGHBOURS, least_on_the_way, n
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.newton import read
 
 BOX = 8  # cells in a box
@@ -66,25 +66,17 @@ MOVED = 16
 class LinesJob(NamedTuple):
     """Arguments of the entry: K pairs of lines of L."""
 
-    tables: NDArray[np.int64]  # (L, ..) jobs of the lines, whose last step led from `old` to `new`
-    joined: NDArray[np.int64]  # (L, 2) what the ends are joined to
+    tables: NumberRows  # (L, ..) jobs of the lines, whose last step led from `old` to `new`
+    joined: NumberRows  # (L, 2) what the ends are joined to
     begins: NDArray[np.int64]  # (L,) where their cells begin in `width`
     width: Floats  # (N,) m, diameters of the cells of all lines
     clock: Clock  # of all lines, as kernels.run.network_run.StepsJob has it
-    pairs: NDArray[np.int64]  # (K, WATCHED)
-    room: Floats  # (K, ROOM)
-    moved: Floats  # (L, MOVED)
+    pairs: NumberRows  # (K, WATCHED)
+    room: Rows  # (K, ROOM)
+    moved: Rows  # (L, MOVED)
 
 
-def blank_lines_job() -> LinesJob:
-    """A job with the types that every one has."""
-    z, whole = np.zeros, np.int64
-    return LinesJob(
-        z((1, 1), whole), z((1, 2), whole), z(1, whole), z(1), Clock(), z((1, WATCHED), whole), z((1, ROOM)),
-        z((1, MOVED)),
-    )  # fmt: skip
-
-
+blank_lines_job = blanks(LinesJob)
 read_lines = reader(blank_lines_job())
 
 

@@ -18,7 +18,7 @@ from hybrid.kernels.laws.surfaces import is_far, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import NamedNumbers, reader
 from hybrid.kernels.state.report import FREE, MEETS_FROM, MEETS_TO, ONSET_OF, PLACE, RADIUS, STRAND
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.newton import Limits, Task, read
 
 
@@ -29,31 +29,31 @@ class NetworkJob(NamedTuple):
     """
 
     asked: NetworkTask
-    tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run.network_run), their task ASSEMBLY
-    numbers: Floats  # the same memory
-    joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
-    fairleads: Floats  # (L, 2, 3) m of ends at bodies, in their axes
-    seats: Floats  # (L, 2, SEAT) frames of ends that turn with bodies (kernels.junctions.joined_lines)
-    arms: Floats  # (L, 2, 3) m, worked in
-    gaps: Floats  # (L, 2, 3) m that ends at bodies have still to go; given for a CORRECTION, else worked in
+    tables: NumberRows  # (L, ..) jobs of the lines (kernels.run.network_run), their task ASSEMBLY
+    numbers: Rows  # the same memory
+    joints: NumberRows  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
+    fairleads: Blocks  # (L, 2, 3) m of ends at bodies, in their axes
+    seats: Blocks  # (L, 2, SEAT) frames of ends that turn with bodies (kernels.junctions.joined_lines)
+    arms: Blocks  # (L, 2, 3) m, worked in
+    gaps: Blocks  # (L, 2, 3) m that ends at bodies have still to go; given for a CORRECTION, else worked in
     floors: Floats  # (L,) N, tension at or below which a catenary cell is slack
     allowed: Floats  # (L,) m, error that a step may make
     first: NDArray[np.int64]  # (L,) where columns of a line begin that carries some
-    columns: Floats  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
+    columns: Blocks  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
     functional: Floats  # (FUNCTIONAL,) worked in, as what follows
-    parts: Floats  # as columns: what right-hand sides count in forces and moments on the start, moments on the end
-    answers: Floats  # (2, ANSWER)
+    parts: Blocks  # as columns: what right-hand sides count in forces and moments on the start, moments on the end
+    answers: Rows  # (2, ANSWER)
     q: Floats  # (COLUMNS,)
-    net: Floats  # (P, 3) on return what does not balance at the points, N
-    bodies: Floats  # (B, NUMBERS ..) what bodies are (kernels.junctions.bodies)
-    old: Floats  # (B, STATE) of bodies
-    new: Floats  # (B, STATE)
-    work: Floats  # (B, WORK)
-    S: Floats  # (HANDED - 1, HANDED)
-    G: Floats  # (2, 6, 6)
-    A: Floats  # (m+5, m+1)
+    net: Rows  # (P, 3) on return what does not balance at the points, N
+    bodies: Rows  # (B, NUMBERS ..) what bodies are (kernels.junctions.bodies)
+    old: Rows  # (B, STATE) of bodies
+    new: Rows  # (B, STATE)
+    work: Rows  # (B, WORK)
+    S: Rows  # (HANDED - 1, HANDED)
+    G: Blocks  # (2, 6, 6)
+    A: Rows  # (m+5, m+1)
     right: Floats  # (3 P + 6 B,) right-hand side of points and bodies themselves, of other corrections of an iteration
-    still: Floats  # (L, 2, 3) zeros: gaps of those
+    still: Blocks  # (L, 2, 3) zeros: gaps of those
     moves: Floats  # (3,) of corrections, as kernels.junctions.borders has it
     begins: NDArray[np.int64]  # (L,) where nodes of lines begin among those of all
     marks: NDArray[np.int64]  # (T,) nodes with another right-hand side; empty: nothing needs one
@@ -62,7 +62,7 @@ class NetworkJob(NamedTuple):
     near: NDArray[np.int64]  # (L,) of all lines, how near they are to what is free (kernels.junctions.network_job)
     alone: NDArray[np.int64]  # (L,) and whether they are solved by themselves
     borders: NDArray[np.int64]  # (K,) addresses of their kernels, in their order
-    border_tables: NDArray[np.int64]  # (K, ..) and their tables
+    border_tables: NumberRows  # (K, ..) and their tables
     solver: int = 0  # address of the kernel that marches a line
 
 
@@ -88,16 +88,7 @@ class NetworkTask(NamedNumbers):
     scheme_ca: float
 
 
-def blank_system_job() -> NetworkJob:
-    """A job with the types that every one has."""
-    z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
-    return NetworkJob(
-        NetworkTask(), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
-        z((1, 1, 1)), z(1), z((1, 1, 1)), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
-        z((2, 6, 6)), z((1, 1)), z(1), z((1, 2, 3)), z(3), one, one, one, one, one, one, one, two,
-    )  # fmt: skip
-
-
+blank_system_job = blanks(NetworkJob)
 read_system = reader(blank_system_job())
 
 

@@ -43,7 +43,7 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.reel.reel import MOVES, WAITS
 from hybrid.kernels.reel.reel import read as read_reel
 from hybrid.kernels.state.report import ALONE, BEARING, FREE, INERTIA, LEFT_OVER, SPIN, TRUE, YIELDING
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Blocks, Rows, blanks
 from hybrid.kernels.step.newton import STEP, read, wind
 
 
@@ -51,18 +51,13 @@ class SpinningJob(NamedTuple):
     """Arguments of the entry; T nodes of all lines, K sheaves."""
 
     system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
-    kept: Floats  # (T, 5) corrections of lines without sheaves
-    moved: Floats  # (B, 6) and of bodies
-    turned: Floats  # (K, B, 6) z of bodies; that of lines is in their Sea.rolling
+    kept: Rows  # (T, 5) corrections of lines without sheaves
+    moved: Rows  # (B, 6) and of bodies
+    turned: Blocks  # (K, B, 6) z of bodies; that of lines is in their Sea.rolling
     rank: int = 0
 
 
-def blank_spinning_job() -> SpinningJob:
-    """A job with the types that every one has."""
-    z = np.zeros
-    return SpinningJob(np.zeros(1, np.int64), z((2, SIZE)), z((1, 6)), z((1, 1, 6)))
-
-
+blank_spinning_job = blanks(SpinningJob)
 read_spinning = reader(blank_spinning_job())
 
 
@@ -215,19 +210,14 @@ class WindingJob(NamedTuple):
     """Arguments of the entry; T nodes of all lines, W winches."""
 
     system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
-    kept: Floats  # (T, 5) corrections of lines without winches
-    moved: Floats  # (B, 6) and of bodies
-    lengthened: Floats  # (W, T, 5) z of lines
-    drawn: Floats  # (W, B, 6) and of bodies
+    kept: Rows  # (T, 5) corrections of lines without winches
+    moved: Rows  # (B, 6) and of bodies
+    lengthened: Blocks  # (W, T, 5) z of lines
+    drawn: Blocks  # (W, B, 6) and of bodies
     rank: int = 0
 
 
-def blank_winding_job() -> WindingJob:
-    """A job with the types that every one has."""
-    z = np.zeros
-    return WindingJob(np.zeros(1, np.int64), z((2, SIZE)), z((1, 6)), z((1, 1, SIZE)), z((1, 1, 6)))
-
-
+blank_winding_job = blanks(WindingJob)
 read_winding = reader(blank_winding_job())
 
 

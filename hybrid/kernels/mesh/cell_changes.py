@@ -28,26 +28,13 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.mesh.cell_lengths import arc_less_chord
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME, RemeshPlaces
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, RELAXES, TIME, RemeshPlaces
 from hybrid.kernels.mesh.zone_criteria import shares, soften
-from hybrid.kernels.mesh.zone_step import ZoneClock, ZoneFlags, Zones, blank_zones
-from hybrid.kernels.mesh.zone_transfer import Transfer, blank_transfer, carry_push, old_cell, put3, transfer_state
-from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, Clock, blank_books
+from hybrid.kernels.mesh.zone_step import ZoneClock, ZoneFlags, Zones
+from hybrid.kernels.mesh.zone_transfer import Transfer, carry_push, old_cell, put3, transfer_state
+from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, PLANAR, SEABED_ENERGY, TOUCHES, WAVES
-from hybrid.kernels.state.state import (
-    Ends,
-    Floats,
-    Line,
-    Sea,
-    State,
-    Work,
-    blank_line,
-    blank_state,
-    no_ends,
-    no_sea,
-    no_work,
-)
+from hybrid.kernels.state.state import Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blanks
 from hybrid.kernels.step.newton import read
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.watch.extremes import carry_extremes, fold_gone, match_nodes
@@ -74,13 +61,7 @@ class CellPlanner(NamedTuple):
     places: NDArray[np.int64]  # nodes of the lines whose outputs wait
 
 
-def blank_cell_planner() -> CellPlanner:
-    """A planner with the types that every one has."""
-    flags, whole = np.zeros(1, bool), np.zeros(1, np.int64)
-    return CellPlanner(
-        flags, flags, whole, np.zeros(1), whole, np.zeros(1), whole, flags, whole, flags, RemeshPlaces(), Clock(),
-        ZoneClock(), ZoneFlags(), np.zeros(NUMBERS), whole,
-    )  # fmt: skip
+blank_cell_planner = blanks(CellPlanner)
 
 
 class RenewJob(NamedTuple):
@@ -94,7 +75,7 @@ class RenewJob(NamedTuple):
     place: NDArray[np.int64]  # (M+1,)
     of: NDArray[np.int64]  # (M,)
     first: NDArray[np.int64]  # (n+1,)
-    start: Floats  # (K+1, 3) m, of the nodes of the finest mesh: positions from which displacements count
+    start: Rows  # (K+1, 3) m, of the nodes of the finest mesh: positions from which displacements count
     marked: NDArray[np.int8]  # (n+1,) marks of base nodes
     borne: Floats  # (n,) length over unstretched length that base cells bear
     state: State  # of the new cells
@@ -104,11 +85,11 @@ class RenewJob(NamedTuple):
     zones: Zones
     before: Books
     books: Books
-    push: Floats  # (N+1, 4) out of the plane; empty: none
-    new_push: Floats  # (M+1, 4)
-    next_push: Floats  # (M+1, 4) a copy of it (written)
+    push: Rows  # (N+1, 4) out of the plane; empty: none
+    new_push: Rows  # (M+1, 4)
+    next_push: Rows  # (M+1, 4) a copy of it (written)
     envelope_s: Floats  # (E,) m, places of extremes of all meshes
-    bounds: Floats  # (4, EXTREMES, E)
+    bounds: Blocks  # (4, EXTREMES, E)
     stays: NDArray[np.int64]  # room for all nodes
     spare: Floats  # room for the extremes of all nodes
     width: Floats  # (M,) m, diameters of the new cells; empty: nobody watches whether the line meets itself
@@ -117,16 +98,7 @@ class RenewJob(NamedTuple):
     scale: float  # N, tension scale
 
 
-def blank_renew_job() -> RenewJob:
-    """A job with the types that every one has."""
-    z, state, books = np.zeros, blank_state(1), blank_books()
-    return RenewJob(
-        z(2), z(1, bool), z(2), z(1, bool), blank_line(1), z(2, np.int64), z(1, np.int64), z(2, np.int64), z((2, 3)),
-        z(2, np.int8), z(1), state, state, no_sea(1), no_work(), blank_zones(1, 1), books, books, z((0, 4)), z((0, 4)), z((0, 4)), z(2),
-        z((4, b.EXTREMES, 2)), z(2, np.int64), z(2), z(0), z(2, np.int64), z(1), 1.0,
-    )  # fmt: skip
-
-
+blank_renew_job = blanks(RenewJob)
 read_planner, read_renew = reader(blank_cell_planner()), reader(blank_renew_job())
 
 
@@ -352,12 +324,7 @@ class SwitchJob(NamedTuple):
     guided: Floats  # (2,) 1 where an end holds the tangent, and with it a frame
 
 
-def blank_switch_job() -> SwitchJob:
-    """A job with the types that every one has."""
-    zones = blank_zones(1, 1)
-    return SwitchJob(blank_transfer(), no_ends(), no_sea(1), no_sea(1), zones, zones, np.zeros(NUMBERS), np.zeros(2))
-
-
+blank_switch_job = blanks(SwitchJob)
 read_switch = reader(blank_switch_job())
 
 

@@ -26,11 +26,26 @@ from hybrid.kernels.contact.self_distance import boxes_of
 from hybrid.kernels.laws.element import put_spring
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.references import NamedNumbers, caller, reader, rows
-from hybrid.kernels.mesh.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
+from hybrid.kernels.machine.references import NamedNumbers, by_reference, caller, reader, rows
+from hybrid.kernels.mesh.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
-from hybrid.kernels.state.state import FIELDS, HALF, MEAN, POINT, ROD, SHARED, Field, Floats, Line, blank_line
+from hybrid.kernels.state.state import (
+    FIELDS,
+    HALF,
+    MEAN,
+    POINT,
+    ROD,
+    SHARED,
+    Field,
+    Floats,
+    Line,
+    NumberBlocks,
+    NumberRows,
+    Rows,
+    blank_line,
+    blanks,
+)
 from hybrid.kernels.step.newton import ASSEMBLY, RUN
 
 Numbers = NDArray[np.int64]
@@ -85,36 +100,28 @@ class RemeshJob(NamedTuple):
     clock: Clock  # of the run
     own: Clock  # and of the line, which is another one where there are several
     counts: b.Counts
-    work: Floats
+    work: Rows
     numbers: Floats  # (NUMBERS,)
-    planners: NDArray[np.int64]  # (2 sides, size) tables of the planner
-    parts: NDArray[np.int64]  # (P, 3) address of the kernel of a part, begin and end of its table in `change`
+    planners: NumberRows  # (2 sides, size) tables of the planner
+    parts: NumberRows  # (P, 3) address of the kernel of a part, begin and end of its table in `change`
     change: Numbers  # tables of the parts, one behind the other
-    changed: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
+    changed: NumberBlocks  # (2 old sides x 2 parities, 3, size)
     run: Numbers  # table of the run
     run_places: Numbers  # of those of its numbers that follow the cells
-    in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
+    in_run: NumberBlocks  # (2 sides, 3, run_places.size)
     even: Numbers  # likewise its tables in steps from states of even parity, and of odd
     odd: Numbers
-    in_odd: NDArray[np.int64]  # likewise of those
+    in_odd: NumberBlocks  # likewise of those
     beside: Numbers  # likewise a table of what moves beside: zones, or the reel
     beside_places: Numbers
-    in_beside: NDArray[np.int64]
+    in_beside: NumberBlocks
     itself: Numbers  # of kernels.contact.self_distance.watch_itself
     itself_places: Numbers  # empty: nobody watches
-    in_itself: NDArray[np.int64]
-    waiting: NDArray[np.int64]  # (lines, 3)
+    in_itself: NumberBlocks
+    waiting: NumberRows  # (lines, 3)
 
 
-def blank_remesh_job() -> RemeshJob:
-    """A job with the types that every one has."""
-    z, few, rows, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
-    return RemeshJob(
-        RemeshCalls(), RemeshPlaces(), b.Clock(), b.Clock(), b.Counts(), z((2, b.WORKS)), z(NUMBERS),
-        z((2, 1), np.int64), rows, few, sides, few, few, sides, few, few, sides, few, few, sides, few, few, sides, rows,
-    )  # fmt: skip
-
-
+blank_remesh_job = blanks(RemeshJob)
 read = reader(blank_remesh_job())
 call, call_count, call_solver = caller(None), caller(0), caller((0, 0, 0.0, 0))
 boxes = inner(boxes_of)
@@ -411,6 +418,9 @@ def blank_cable(n: int) -> Cable:
     )  # fmt: skip
 
 
+by_reference(blank_cable(1))
+
+
 class LineJob(NamedTuple):
     """A cable, its cells, and the line of these (written)."""
 
@@ -431,14 +441,10 @@ class KindsJob(NamedTuple):
     least: float  # N, that it must have whatever the cable
 
 
-def blank_line_job() -> LineJob:
-    return LineJob(blank_cable(1), np.zeros(2), np.zeros(1, np.int64), np.zeros(1, bool), blank_line(1))
+blank_line_job = blanks(LineJob)
 
 
-def blank_kinds_job() -> KindsJob:
-    return KindsJob(blank_cable(1), np.zeros(1, np.int64), blank_kinds(1, 1), 0.0, 0.0)
-
-
+blank_kinds_job = blanks(KindsJob)
 read_line, read_kinds = reader(blank_line_job()), reader(blank_kinds_job())
 
 

@@ -6,7 +6,7 @@ Compiled, because it is asked for a plan several times in a hold time, mostly wi
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_criteria import CRITERIA, GIVEN, TORSION
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, Rows, blanks
 
 OFF = np.array([x.off for x in CRITERIA])
 ROUND_BUFFER = 1e-9  # of a length
@@ -166,14 +166,14 @@ class ReviewJob(NamedTuple):
     base: Floats  # (n+1,) m
     given: NDArray[np.int64]  # (n,)
     below_since: Floats  # (n,) s, since when rods are below their thresholds
-    release_cause: Floats  # (2, n) of rods on their way out: the criterion of `leading_criterion`, and its ratio
+    release_cause: Rows  # (2, n) of rods on their way out: the criterion of `leading_criterion`, and its ratio
     wait_factor: Floats  # (n,) dwell times that each must be below
-    seen: Floats  # (criteria, n), largest ratios since the last output
+    seen: Rows  # (criteria, n), largest ratios since the last output
     buffer: Floats  # (n,) m (written)
     off: Floats  # (criteria,)
     next_below: Floats  # (n,) s, `below_since` as a plan would have it (written)
     wait: Floats  # (n,) s (written)
-    flags: NDArray[np.bool_]  # (4, n) (written)
+    flags: Annotated[NDArray[np.bool_], 2]  # (4, n) (written)
     shortest: int  # cells
     dwell: float  # s
     parts: float  # of the buffer
@@ -184,16 +184,7 @@ class ReviewJob(NamedTuple):
     held: int  # 1 where rods may not go
 
 
-def blank_review_job() -> ReviewJob:
-    """A job with the types that every one has."""
-    each, whole, flags = np.zeros(1), np.zeros(1, np.int64), np.zeros((4, 1), bool)
-    rows = np.zeros((1, 1))
-    return ReviewJob(
-        whole, each, whole, each, rows, each, rows, each, each, each, each, flags,
-        0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0,
-    )  # fmt: skip
-
-
+blank_review_job = blanks(ReviewJob)
 read, read_zones = reader(blank_review_job()), reader(z.blank_zone_job())
 
 

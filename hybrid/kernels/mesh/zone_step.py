@@ -20,7 +20,7 @@ from hybrid.kernels.laws.obstacles import surface_velocity
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.references import NamedNumbers, caller, reader
+from hybrid.kernels.machine.references import NamedNumbers, by_reference, caller, reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_errors import (
     CURVATURE,
@@ -60,9 +60,9 @@ from hybrid.kernels.mesh.zone_criteria import (
     twist_of_rods,
 )
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import WORKS, Clock, Counts
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.report import OBSTACLES, STRAND
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+from hybrid.kernels.state.state import Ends, Floats, Line, Rows, Sea, State, blanks
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
 LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
@@ -89,7 +89,6 @@ class ZoneClock(NamedNumbers):
     steady_step: float  # longest steps: while nothing is ramped, and else
     ramp_step: float
     share: float  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
-    left: float  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
     fineness: float  # of cells that follow the curvature: those that lengths ask for are so many times as short
     fastest: float  # m/s, by how much velocities of nodes differed of late
     edge_time: float  # s, for which the way of a contact edge is foreseen
@@ -172,6 +171,9 @@ def blank_zones(cells: int, base: int) -> Zones:
     )  # fmt: skip
 
 
+by_reference(blank_zones(1, 1))
+
+
 class ZoneJob(NamedTuple):
     """Arguments of the entries: two states in turn as kernels.run.network_run has them, and its clock, counts and work."""
 
@@ -182,7 +184,7 @@ class ZoneJob(NamedTuple):
     new: State
     clock: Clock
     counts: Counts
-    work: Floats
+    work: Rows
     zones: Zones
     near: (
         Floats  # (N+1,) how near the line is to itself (kernels.contact.self_contact_pairs.look_ahead); empty: unknown
@@ -191,25 +193,7 @@ class ZoneJob(NamedTuple):
     review: int = 0  # address of kernels.mesh.zone_plan.quiet_review; 0: Python reviews
 
 
-def blank_zone_job() -> ZoneJob:
-    """A job with the types that every one has."""
-    state = blank_state(1)
-    clock, counts, work = b.Clock(), Counts(), np.zeros((2, WORKS))
-    return ZoneJob(
-        blank_line(1),
-        no_sea(1),
-        no_ends(),
-        state,
-        state,
-        clock,
-        counts,
-        work,
-        blank_zones(1, 1),
-        np.zeros(0),
-        np.zeros(1, np.int64),
-    )
-
-
+blank_zone_job = blanks(ZoneJob)
 read, call_review = reader(blank_zone_job()), caller(0)
 
 
@@ -319,10 +303,10 @@ def find_shares(line, state, zones):
         tension = max(tension, state.T[c])
     for k, size in ((TENSION, tension), (CURVATURE, kappa), (MOMENT, moment)):
         zones.largest[k] = max(zones.largest[k], size)
-        share = zones.asked[k] * zones.largest[k] / z.left
+        share = zones.asked[k] * zones.largest[k]
         zones.shares[k], zones.limits[k] = share if share > 0.0 else math.inf, math.inf
     finer = 1.0 / (z.fineness * z.fineness)  # of second order
-    zones.shares[POSITION], zones.limits[POSITION] = z.tolerance / z.left, z.tolerance * finer
+    zones.shares[POSITION], zones.limits[POSITION] = z.tolerance, z.tolerance * finer
     if z.share > 0.0 and zones.largest[CURVATURE] * (line.s[n] - line.s[0]) > STRAIGHT:
         zones.limits[CURVATURE] = z.share * zones.largest[CURVATURE] * finer
 

@@ -24,7 +24,7 @@ from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import ROTARY
-from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
+from hybrid.kernels.state.state import Blocks, Floats, Line, State, blanks
 
 # How the frame at an end of a zone goes on.
 CARRIED = 2
@@ -59,25 +59,15 @@ class Transfer(NamedTuple):
     out: State  # zeros
     place: NDArray[np.int64]  # (N+1,) of old nodes: their numbers on the mesh that is rod everywhere
     target_place: NDArray[np.int64]  # (M+1,) and of new ones
-    base_of_cell: NDArray[np.int64]  # (M,) base cell of new cells
     first: NDArray[np.int64]  # (n+1,) first old node of base cells
     kinks: NDArray[np.bool_]  # (n+1,) base nodes where tangent and tension may jump
-    twist: Floats  # (n,) 1/m, twist to give to the frames of base cells that become rod
-    clamps: Floats  # (2, 2, 3) first director and tangent of what holds the twist of an end
+    clamps: Blocks  # (2, 2, 3) first director and tangent of what holds the twist of an end
     held: NDArray[np.bool_]  # (2,) whether something does
     shifts: NDArray[np.bool_]  # (1,) whether momentum is kept by a shift of velocities
     match: Match
 
 
-def blank_transfer() -> Transfer:
-    """A transfer with the types that every one has."""
-    line, state, whole = blank_line(1), blank_state(1), np.zeros(2, np.int64)
-    return Transfer(
-        line, line, state, state, whole, whole, whole, whole, np.zeros(2, bool), np.zeros(1), np.zeros((2, 2, 3)),
-        np.zeros(2, bool), np.ones(1, bool), blank_match(1, 1),
-    )  # fmt: skip
-
-
+blank_transfer = blanks(Transfer)
 read = reader(blank_transfer())
 
 
@@ -417,13 +407,13 @@ def beside(job, c, k):
 @inner
 def make_frames(job, p, q):
     """First directors of the fresh rod cells p to q (excluded): carried on from those beside it, and from clamps."""
-    out, target = job.out, job.target
+    out = job.out
     a, t, left = beside(job, p, 0)
     b, u, right = beside(job, q - 1, 1)
     if not left and right:
         for c in range(q - 1, p - 1, -1):
             d = direction(out, c)
-            b, u = spin_about(carried(b, u, d), d, -job.twist[job.base_of_cell[c]] * target.h[c]), d
+            b, u = carried(b, u, d), d
             put3(out.a1, c, b)
         return
     first = p
@@ -432,9 +422,8 @@ def make_frames(job, p, q):
         a, first = across(t), p + 1
         put3(out.a1, p, a)
     for c in range(first, q):
-        turn = job.twist[job.base_of_cell[c]] * target.h[c] * (0.5 if c == 0 else 1.0)  # a clamp is half a cell away
         d = direction(out, c)
-        a, t = spin_about(carried(a, t, d), d, turn), d
+        a, t = carried(a, t, d), d
         put3(out.a1, c, a)
     if left and right:  # what is left of the twist is spread
         closing = carried(a, t, u)

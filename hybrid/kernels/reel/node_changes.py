@@ -15,27 +15,14 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_changes import begin_anew, clear
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RemeshPlaces, copy_cell, copy_node, move_line
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, RemeshPlaces, copy_cell, copy_node, move_line
 from hybrid.kernels.reel.paid_length import cell, node, prepare
-from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
-from hybrid.kernels.reel.reel import Reel, blank_reel
+from hybrid.kernels.reel.payout_nodes import CarryJob, move_row, place_reel
+from hybrid.kernels.reel.reel import Reel
 from hybrid.kernels.reel.winch import Winch, at_its_end
-from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books, blank_books
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.report import TOUCHES
-from hybrid.kernels.state.state import (
-    Ends,
-    Floats,
-    Line,
-    Sea,
-    State,
-    Work,
-    blank_line,
-    blank_state,
-    no_ends,
-    no_sea,
-    no_work,
-)
+from hybrid.kernels.state.state import Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blanks
 
 
 class NodeJob(NamedTuple):
@@ -49,32 +36,23 @@ class NodeJob(NamedTuple):
     twin: State
     before: Books
     books: Books
-    push: Floats  # (N+1, 4) out of the plane; empty: none
-    new_push: Floats
-    next_push: Floats
+    push: Rows  # (N+1, 4) out of the plane; empty: none
+    new_push: Rows
+    next_push: Rows
     width: Floats  # (M,) m, diameters of the new cells; empty: nobody watches whether the line meets itself
     nearest: NDArray[np.int64]  # (2,) the pair of its cells that was nearest
     borne: Floats  # (P,) length over unstretched length that pieces bear, as of Reel.pieces
     widths: Floats  # (P,) m, their diameters
-    start: Floats  # (M, 3) m, of all material nodes along the line: positions from which displacements count
-    bounds: Floats  # (4, EXTREMES, E) extremes at all nodes, along the line, those that are marked twice
-    moment: Floats  # (M+1, 3) this and the next: work arrays
-    strain: Floats
+    start: Rows  # (M, 3) m, of all material nodes along the line: positions from which displacements count
+    bounds: Blocks  # (4, EXTREMES, E) extremes at all nodes, along the line, those that are marked twice
+    moment: Rows  # (M+1, 3) this and the next: work arrays
+    strain: Rows
     energy: Floats  # (5,)
     numbers: Floats  # (NUMBERS,) of kernels.mesh.remesh
     scale: float  # N, tension scale
 
 
-def blank_node_job() -> NodeJob:
-    """A job with the types that every one has."""
-    z, books, none = np.zeros, blank_books(), np.zeros((0, 4))
-    return NodeJob(
-        blank_carry_job(), blank_line(1), no_ends(), no_sea(1), no_work(), blank_state(1), books, books, none, none,
-        none, z(0), z(2, np.int64), z(1), z(1), z((2, 3)), z((4, b.EXTREMES, 2)), z((2, 3)), z((2, 3)), z(5), z(NUMBERS),
-        1.0,
-    )  # fmt: skip
-
-
+blank_node_job = blanks(NodeJob)
 read_node = reader(blank_node_job())
 
 
@@ -234,10 +212,7 @@ class LineJob(NamedTuple):
     nodes: Floats  # (M,) m
 
 
-def blank_line_job() -> LineJob:
-    return LineJob(blank_line(1), blank_line(1), blank_line(1), blank_reel(1), np.zeros(2))
-
-
+blank_line_job = blanks(LineJob)
 read_line = reader(blank_line_job())
 
 
@@ -263,11 +238,7 @@ class NodePlanner(NamedTuple):
     room: Floats  # for what cells of lines of before lacked
 
 
-def blank_node_planner() -> NodePlanner:
-    """A planner with the types that every one has."""
-    return NodePlanner(RemeshPlaces(), blank_reel(1), Winch(), np.zeros(1))
-
-
+blank_node_planner = blanks(NodePlanner)
 read_planner = reader(blank_node_planner())
 
 

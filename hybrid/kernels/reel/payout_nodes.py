@@ -24,17 +24,10 @@ from hybrid.kernels.reel.damping import strain_at
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, place_of
 from hybrid.kernels.reel.payout import slope_at, velocity_at
 from hybrid.kernels.reel.payout_work import put_travels
-from hybrid.kernels.reel.reel import (
-    ENTERS,
-    FEWEST_STEPS,
-    LEAVES,
-    Reel,
-    blank_reel,
-)
-from hybrid.kernels.state import books as b
+from hybrid.kernels.reel.reel import ENTERS, FEWEST_STEPS, LEAVES, Reel
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
-from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
+from hybrid.kernels.state.state import Floats, Line, Rows, State, blanks
 from hybrid.kernels.step.step_control import lead
 
 
@@ -51,16 +44,11 @@ class CarryJob(NamedTuple):
     reel: Reel
     new: Reel  # what its cells lack is written
     clock: Clock  # of the run
-    tension: Floats  # (2, N) N, before the last step
+    tension: Rows  # (2, N) N, before the last step
     nodes: Floats  # (M,) m, places of all material nodes that there may be
 
 
-def blank_carry_job() -> CarryJob:
-    """A job with the types that every one has."""
-    line, state, reel, z = blank_line(1), blank_state(1), blank_reel(1), np.zeros
-    return CarryJob(line, line, state, state, reel, reel, b.Clock(), z((2, 1)), z(2))
-
-
+blank_carry_job = blanks(CarryJob)
 read = reader(blank_carry_job())
 
 

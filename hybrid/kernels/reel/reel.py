@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.machine.references import NamedNumbers, reader
+from hybrid.kernels.machine.references import NamedNumbers, by_reference, reader
 from hybrid.kernels.mesh.remesh import COLUMNS
 from hybrid.kernels.reel.winch import Winch
-from hybrid.kernels.state.books import WORKS, Clock, Counts
+from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.report import REPORT_SIZE
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+from hybrid.kernels.state.state import Ends, Floats, Line, Rows, Sea, State, blanks
 
 # Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
 ENTERS, LEAVES = 0.85, 0.35
@@ -139,11 +139,14 @@ def blank_reel(
     )  # fmt: skip
 
 
+by_reference(blank_reel(1))
+
+
 class MovingZones(NamedTuple):
     """Of zones that move (kernels.mesh.zone_step.Zones), what they take the work of lengths and stiffness from."""
 
     lengths: Floats  # (N,) m, at the end of the last step; none where zones stay
-    stiff: Floats  # (N+1, 3) N m
+    stiff: Rows  # (N+1, 3) N m
 
 
 def zones_that_stay() -> MovingZones:
@@ -160,8 +163,8 @@ class ReelJob(NamedTuple):
     new: State
     clock: Clock
     counts: Counts
-    work: Floats  # (2, WORKS)
-    velocity: Floats  # (2, 3) m/s, of the ends
+    work: Rows  # (2, WORKS)
+    velocity: Rows  # (2, 3) m/s, of the ends
     report: Floats  # (REPORT_SIZE,) of the step
     reel: Reel
     X: Floats  # of the line's kernels.state.state.Work
@@ -169,13 +172,5 @@ class ReelJob(NamedTuple):
     zones: MovingZones
 
 
-def blank_reel_job() -> ReelJob:
-    """A job with the types that every one has."""
-    state, z = blank_state(1), np.zeros
-    return ReelJob(
-        blank_line(1), no_sea(1), no_ends(), state, state, Clock(), Counts(), z((2, WORKS)),
-        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0), z(0), zones_that_stay(),
-    )  # fmt: skip
-
-
+blank_reel_job = blanks(ReelJob)
 read = reader(blank_reel_job())

@@ -5,12 +5,14 @@ All are NamedTuples of contiguous arrays with fixed types, so that one compiled 
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.machine.references import by_reference
+from hybrid.kernels.machine.references import by_reference, examples
 from hybrid.kernels.state.report import (
     CARRIED,
     EACH,
@@ -574,3 +576,35 @@ def no_work() -> Work:
 
 for _each in (blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no_work()):
     by_reference(_each)
+
+
+# Arguments of kernels are NamedTuples whose annotations say of each array how many dimensions it has: one, or these.
+Rows = Annotated[Floats, 2]
+Blocks = Annotated[Floats, 3]
+NumberRows = Annotated[NDArray[np.int64], 2]
+NumberBlocks = Annotated[NDArray[np.int64], 3]
+Arguments = TypeVar("Arguments")
+
+
+def blanks(of: type[Arguments]) -> Callable[[], Arguments]:
+    """What makes arguments of a kernel with the types that all have: nothing in arrays, zeros, and defaults."""
+    return partial(_blank_value, of)
+
+
+def _blank_value(of: Any) -> Any:
+    """A value of a type; of a class that is kept by reference arrays of its own, as its example has them."""
+    if of in examples:
+        return _copied(examples[of])
+    if hasattr(of, "_field_defaults"):
+        kinds = get_type_hints(of, include_extras=True)
+        return of(**{name: _blank_value(kind) for name, kind in kinds.items()} | of._field_defaults)
+    if isinstance(of, type):
+        return of()  # a number, or numbers with names
+    kind, dimensions = get_args(of) if hasattr(of, "__metadata__") else (of, 1)
+    return np.zeros((0,) * dimensions, get_args(get_args(kind)[1])[0])
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return type(value)(*map(_copied, value))
+    return value.copy() if isinstance(value, np.ndarray) else value
