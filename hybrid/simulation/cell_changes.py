@@ -240,7 +240,8 @@ class CellChanges(Remesh):
         self._clamps[:], self._held[:] = switching.clamps(self.model.ends.at_time(t))
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.use_cells_of(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
-        switching.limit_steps(self._run.loop.clock)
+        clock = switching.zones.clock
+        self._run.loop.clock.allowed = clock.ramp_step if manager.ramping else clock.steady_step
         self.sync()
         return booked
 

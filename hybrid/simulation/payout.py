@@ -15,20 +15,12 @@ from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.node_changes import energy_of
 from hybrid.kernels.reel.paid_length import carry_layers, length_at
-from hybrid.kernels.reel.payout import (
-    end_payout,
-    fit_line,
-    lengthen,
-    limit_next_step,
-    put_forces_on,
-    remove_forces,
-    stand_still,
-)
+from hybrid.kernels.reel.payout import end_payout, fit_line, lengthen, put_forces_on, remove_forces
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
-from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, slip_size, state_for
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, copied, slip_size, state_for
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, Zone, on_other_parts
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, lengths_at, payout_of
@@ -106,11 +98,6 @@ class PayingOut:
         cells = line.h.size
         sea = model.sea if cells == model.cells else model.sea.on(cells)
         return replace(model, line=line, zones=zones, sea=sea, length=length, layout=layout, on_base=on_base)
-
-    def begin_phases(self, line: Line, state: State) -> None:
-        """Vortices begin once round along the line, in a state at rest; a node that comes has the phase beside it."""
-        if state.wake.size:
-            state.wake[:, PHASE] = 2.0 * np.pi * line.s / self.plan.first
 
     def end(self, before: Before, line: Line, ends: Ends) -> float:
         """The end at the winch is let go: what is out goes on as it moves, and no more comes; the energy, J, of that.
@@ -201,10 +188,6 @@ class PayingOut:
             most = float(self.winch.max_rate)
             return most if np.isfinite(most) else abs(float(self.winch.rate_now))
         return fastest(self.law)
-
-    def stand_still(self) -> None:
-        """The line as it is now, and the force of its fairlead in the report of a state that no step has led to."""
-        stand_still(self.table.numbers)
 
     @contextmanager
     def forces_on(self) -> Iterator[None]:
@@ -389,7 +372,7 @@ class PayingOut:
         varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in varying(model.line)}
         zones = []
         moving = model.zones if model.layout is not None else None
-        scratch = own_arrays(model.line)
+        scratch = copied(model.line)
         for k, (line, zones_then) in enumerate(self._lines_of(scratch, self.reel, batch, moving)):
             zones.append(zones_then)
             for name, x in varied.items():
@@ -442,7 +425,7 @@ class PayingOut:
 
     def outputs_of_now(self, line: Line, batch: Batch) -> list[Output]:
         """The same of the line as it is, which keep the arrays of `batch` alone."""
-        return self.outputs_in(own_arrays(line), self.reel, batch)
+        return self.outputs_in(copied(line), self.reel, batch)
 
     # --- checkpoints ------------------------------------------------------------------------------
 
@@ -528,10 +511,6 @@ class PayingOut:
         else:
             self._set_law(law)
 
-    def limit_step(self) -> None:
-        """Of steps that follow the motion: the next one is no longer than the law of the length allows."""
-        limit_next_step(self.table.numbers)
-
     def lengthen(self) -> None:
         """The line as it is at the time of its run."""
         lengthen(self.table.numbers)
@@ -565,12 +544,6 @@ def length_asked(scene: LineScene, paying: PayingOut, length: Any, rate: Any, wh
 def varying(line: Line) -> list[str]:
     """Arrays of a line that its length changes, and that outputs ask for."""
     return [*VARIES, *(name for name in VARIES_TOO if getattr(line, name).size)]
-
-
-def own_arrays(line: Line) -> Line:
-    """The line in arrays of its own."""
-    own: Line = line._replace(**{name: getattr(line, name).copy() for name in (*ALONG_LINE, *VARIES_TOO)})
-    return own
 
 
 def energy(line: Line, ends: Ends, state: State, sea: Sea | None = None) -> float:

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
+from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.mesh.zone_criteria import soften
-from hybrid.kernels.reel.payout import iterate, iterate_with_others, pay_out, stand_among
+from hybrid.kernels.reel.payout import iterate, iterate_with_others, limit_next_step, pay_out, stand_among, stand_still
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, State, state_for
@@ -176,8 +177,9 @@ class RunPayout(Part):
         self.zones: dict[int, PaidZones] = {}  # of those whose zones move
         self.lines = {k: PayingOut(x) for k, x in enumerate(run.model.models) if x.payout is not None}
         self._use_models({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
-        for k, x in self.lines.items():
-            x.begin_phases(run.model.models[k].line, run.state.lines[k])
+        for k, x in self.lines.items():  # vortices begin once round along the line
+            wake = run.state.lines[k].wake
+            wake[:, PHASE] = 2.0 * np.pi * run.model.models[k].line.s[: len(wake)] / x.plan.first
         self._rows = np.array([x.table.numbers for x in self.lines.values()])
         for row, x in zip(self._rows, self.lines.values(), strict=True):
             x.table.move(row)
@@ -258,7 +260,7 @@ class RunPayout(Part):
         """
         with ExitStack() as stack:
             for x in self.lines.values():
-                x.stand_still()
+                stand_still(x.table.numbers)
             for x in self.lines.values():
                 stack.enter_context(x.forces_on())
             yield {k: x.lengthening for k, x in self.lines.items()}
@@ -330,7 +332,7 @@ class RunPayout(Part):
     def begin_leg(self) -> None:
         """The next step is no longer than the laws of the lengths allow."""
         for x in self.lines.values():
-            x.limit_step()
+            limit_next_step(x.table.numbers)
 
     def fit_models(self, model: NetworkModel) -> NetworkModel:
         """A model with other loads on the cells of t = 0, with the cells of now."""

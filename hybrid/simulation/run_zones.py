@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,14 +32,14 @@ from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Counts
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import FIELDS, ROD, Ends, Line, State, state_for
+from hybrid.kernels.state.state import FIELDS, ROD, Ends, Line, State, copied, state_for
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.simulation.cell_changes import CellChanges, carries_all
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.parts import Part
-from hybrid.simulation.remesh import Around
+from hybrid.simulation.remesh import Around, copy_fields
 from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.result_file import marks_on
 from hybrid.simulation.run_of_lines import RunOfLines
@@ -107,24 +107,22 @@ class _LineZones:
     def do_phase(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
         self.counts.phase, self.clock.now, self.clock.try_end = phase, t, end
-        model = self.switching.model
-        self.switching.table.bind(
-            line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=self.clock,
-            counts=self.counts, work=run.lines[self.number].books.work, zones=self.switching.zones,
-            near=self.switching.manager.near, review=0,
-        )  # fmt: skip
-        advance_zones(self.switching.table.numbers)
+        advance_zones(self._bind(run, old, new, self.clock, self.counts, review=0).numbers)
 
     def bind(self, run: RunOfLines, loop: NetworkSteps) -> Table:
         """What follows the zones within the compiled steps of a loop."""
-        model, (even, odd) = self.switching.model, loop.turns
-        self.switching.table.bind(
-            line=model.line, sea=model.sea.values, ends=model.ends.values, old=even.lines[self.number],
-            new=odd.lines[self.number], clock=loop.clock, counts=loop.counts, work=run.lines[self.number].books.work,
-            zones=self.switching.zones, near=self.switching.manager.near,
-        )  # fmt: skip
+        even, odd = (turn.lines[self.number] for turn in loop.turns)
+        self._bind(run, even, odd, loop.clock, loop.counts)
         self.switching.let_review()
         return self.switching.table
+
+    def _bind(self, run: RunOfLines, old: State, new: State, clock: b.Clock, counts: Counts, **more: int) -> Table:
+        switching, model = self.switching, self.switching.model
+        switching.table.bind(
+            line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=clock, counts=counts,
+            work=run.lines[self.number].books.work, zones=switching.zones, near=switching.manager.near, **more,
+        )  # fmt: skip
+        return switching.table
 
 
 class RunZones(Part):
@@ -316,7 +314,7 @@ class RunZones(Part):
                 continue
             if taken.outcome == Outcome.OK and not self._compiled:
                 x.do_phase(run, b.JUDGE, run.t, end, old, new)
-            change = x.switching.rescue(how, end, end - run.t, new, self._rescues)
+            change = x.switching.rescue(how, end, new, self._rescues)
             if change is None and last:
                 change = x.switching.all_rod(how)
             if change is not None:
@@ -457,7 +455,7 @@ class LineKinds:
         """From now on the model has a line of its own, which changes; ends: conditions in the arrays of the run."""
         assert model.layout is not None and model.on_base is not None
         self._switching, self._numbers, self._ends = switching, np.zeros(NUMBERS), ends
-        line, layout, sea, zones = _copied(model.line), model.layout, model.sea.values, switching.zones
+        line, layout, sea, zones = copied(model.line), model.layout, model.sea.values, switching.zones
         self.model = replace(model, line=line)
         own: dict[str, Any] = {name: getattr(line, name).copy() for name in OF_KINDS}
         self._before = line._replace(**own)
@@ -514,18 +512,6 @@ class LineKinds:
         return float(numbers[AFTER] - numbers[BEFORE])
 
 
-def _copied(line: Line) -> Line:
-    arrays: dict[str, Any] = {name: x.copy() for name, x in line._asdict().items() if isinstance(x, np.ndarray)}
-    return line._replace(**arrays)
-
-
-def copy_into(old: NamedTuple, new: NamedTuple) -> None:
-    """Copy the arrays of one to those of the other."""
-    for x, y in zip(old, new, strict=True):
-        if isinstance(y, np.ndarray) and y.size:
-            y[:] = x
-
-
 class RunKinds:
     """Changes of kinds in the lines of a run, with the solver, the states and the books that it has now."""
 
@@ -555,7 +541,7 @@ class RunKinds:
         run, (first, second) = self._run, self._turns
         before, after = (second, first) if run.state is second else (first, second)
         for old, new in zip(before.lines, after.lines, strict=True):
-            copy_into(old, new)
+            copy_fields(old, new)
         after.bodies[:] = before.bodies
         run.state, run.other = first, second
 

@@ -147,7 +147,7 @@ def room_to_meet(nodes: int, rides: NDArray[np.int64], bodies: int) -> Values:
         "found": np.zeros(1 + len(carriers), np.int64), "touched": np.zeros((nodes * len(carriers), TOUCHED)),
         "own": np.zeros((len(carriers), 36)), "wrench": np.zeros((len(carriers), 6)),
         "responses": np.zeros((rows, nodes, SIZE)), "turned": np.zeros((rows, bodies, 6)),
-        "coupling": np.zeros((rows, rows + 1)), "order": np.zeros(rows, np.int64), **room_to_keep(nodes, bodies),
+        "coupling": np.zeros((rows + 5, rows + 1)), **room_to_keep(nodes, bodies),
     }  # fmt: skip
 
 

@@ -11,23 +11,11 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.march.zone_torque import carry_torque
-from hybrid.kernels.mesh.cell_changes import (
-    begin_switch,
-    blank_switch_job,
-    end_switch,
-)
+from hybrid.kernels.mesh.cell_changes import begin_switch, blank_switch_job, end_switch
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
-from hybrid.kernels.mesh.zone_step import (
-    REJECT_RATIO,
-    Zones,
-    blank_zone_job,
-    blank_zones,
-    plan_nodes,
-    read_arcs,
-)
+from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, plan_nodes, read_arcs
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
-from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model
@@ -144,11 +132,6 @@ class ZoneSwitching:
             review = quiet_review.address(self._review.numbers)
         self.table.bind(review_table=self._review.numbers, review=review)
 
-    def limit_steps(self, of_run: Clock) -> None:
-        """Steps are as long as what is ramped allows."""
-        clock = self.zones.clock
-        of_run.allowed = clock.ramp_step if self.manager.ramping else clock.steady_step
-
     def checkpoint(self) -> dict[str, Any]:
         """What is under way: bending, lengths, and what the manager remembers."""
         line, zones = self.model.line, self.zones
@@ -191,7 +174,7 @@ class ZoneSwitching:
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""
         self.manager.reset()
-        self.evaluate_criteria(0.0, 0.0, ends, state)
+        self.manager.evaluate_criteria(self.model.line, self.model.sea.values, ends, state, 0.0)
         zones = self.zones
         if zones.clock.share > 0.0:  # chords become as long as arcs within a ramp time
             self._plan_table.bind(line=self.model.line, ends=ends, new=state, zones=zones)
@@ -199,12 +182,8 @@ class ZoneSwitching:
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
             zones.counts.relaxing = 1
 
-    def evaluate_criteria(self, t: float, dt: float, ends: Ends, state: State) -> None:
-        """Weigh the criteria of a state at t, dt after the last one."""
-        self.manager.evaluate_criteria(self.model.line, self.model.sea.values, ends, state, dt, t)
-
-    def rescue(self, how: Tried, end: float, dt: float, tried: State, rescues: int) -> Change | None:
-        """More rod for a step of dt to `end` that failed or took a catenary too far; None: as it is.
+    def rescue(self, how: Tried, end: float, tried: State, rescues: int) -> Change | None:
+        """More rod for a step to `end` (s) that failed or took a catenary too far; None: as it is.
 
         tried: the state that the step led to; rescues: of this step, so far.
         """
@@ -267,7 +246,8 @@ class ZoneSwitching:
         begin_switch(self._switch_table.numbers)
         if manager.twisted and not target.bits & PLANAR:
             carry_torque(line, target, ends, state, transfer.out, np.zeros(line.s.size + 1))
-        manager.adopt_layout(new, change, t)
+        manager.adopt_rods(new.rod, change, t)
+        manager.set_layout(new)
         self._switch_table.bind(target_zones=self.zones)
         end_switch(self._switch_table.numbers)
         self.zones.counts.relaxing = 1

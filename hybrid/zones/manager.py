@@ -220,11 +220,6 @@ class DomainManager:
         zones.clock.compliance = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
         zones.clock.free_twist = H @ cable.kappa[of, 2]
 
-    def adopt_layout(self, new: Layout, change: Change, t: float) -> None:
-        """Take over the layout of a change, at t."""
-        self.adopt_rods(new.rod, change, t)
-        self.set_layout(new)
-
     def adopt_rods(self, rod: np.ndarray, change: Change, t: float) -> None:
         """Base cells (n,) that are rod from t on: what is new begins to be blended in, faster where it is urgent.
 
@@ -483,14 +478,14 @@ class DomainManager:
     def ramping(self) -> bool:
         return self.going or self.coming
 
-    def stiffness_shares(self, dt: float = 0.0) -> Floats:
-        """Part of its bending stiffness that each node has (N+1,), dt from now; overwritten by the next call.
+    def stiffness_shares(self) -> Floats:
+        """Part of its bending stiffness that each node has now (N+1,); overwritten by the next call.
 
         Over a ramp time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
         tension goes there is less time, and nothing that could ring.
         """
         zones = self.zones
-        shares(self.grown, self.leaving, zones.ramp_factor, dt / self.ramp_time, zones.kinds.base_of_cell, zones.share)
+        shares(self.grown, self.leaving, zones.ramp_factor, 0.0, zones.kinds.base_of_cell, zones.share)
         return zones.share
 
     def _update_ramping(self) -> None:

@@ -9,20 +9,7 @@ import numpy as np
 import pytest
 from adapt_cases import X, cable, even, on, state_on
 from adapt_cases import still as held
-from adapt_scenes import (
-    CELL,
-    DWELL,
-    EI,
-    LENGTH,
-    breathing,
-    changes,
-    comes,
-    goes,
-    output_at,
-    ran,
-    rods,
-    sagging,
-)
+from adapt_scenes import CELL, DWELL, EI, LENGTH, breathing, changes, comes, goes, output_at, ran, rods, sagging
 from problems import Scene, clamped, pinned, scene
 
 import hybrid

@@ -18,16 +18,7 @@ from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygo
 from problems import pinned
 
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.kernels.mesh.zone_criteria import (
-    BEND,
-    CLAMP,
-    CRITERIA,
-    EDGE,
-    FORESEEN,
-    POINT,
-    SLACK,
-    TORSION,
-)
+from hybrid.kernels.mesh.zone_criteria import BEND, CLAMP, CRITERIA, EDGE, FORESEEN, POINT, SLACK, TORSION
 from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import no_sea

@@ -185,7 +185,7 @@ def rescued(outcome: Outcome, rescues: int, slack: int = -1) -> list[int]:
     if slack >= 0:
         tried.T[slack] = model.slack_floor
     switching = ZoneSwitching(model, found)
-    change = switching.rescue(Tried(outcome, 5, 1.0, 11), 1.0, 0.1, tried, rescues)
+    change = switching.rescue(Tried(outcome, 5, 1.0, 11), 1.0, tried, rescues)
     return [] if change is None else np.flatnonzero(change.rod).tolist()
 
 

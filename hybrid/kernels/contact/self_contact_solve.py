@@ -158,6 +158,38 @@ def rotate_column(H, k):
 
 
 @inner
+def begin_columns(H, s):
+    """The least-squares problem of a residual of length s, before the first product."""
+    for i in range(MOST_PRODUCTS + 1):
+        H[i, MOST_PRODUCTS + 2] = 0.0
+    H[0, MOST_PRODUCTS + 2] = s
+
+
+@inner
+def solve_columns(H, done):
+    """Its solution by so many products."""
+    rhs, solution = MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    for j in range(done - 1, -1, -1):
+        s = H[j, rhs]
+        for k in range(j + 1, done):
+            s -= H[j, k] * H[k, solution]
+        H[j, solution] = s / H[j, j]
+
+
+@inner
+def combine_vectors(contact, H, done):
+    """contact.x of the nodes in contact: the vectors of the basis with that solution."""
+    per = unknowns(contact)
+    for k in range(contact.counts.nodes):
+        i = contact.nodes[k]
+        for m in range(per):
+            s = 0.0
+            for j in range(done):
+                s += H[j, MOST_PRODUCTS + 3] * contact.basis[j, per * k + m]
+            contact.x[i, m] = s / length_of(contact, m, i)
+
+
+@inner
 def load_vector(contact, column):
     """contact.x = the basis vector of a column."""
     x, V, per = contact.x, contact.basis, unknowns(contact)
@@ -175,7 +207,7 @@ def find_solution(ends, contact, work, carried, rolling):
     without contact stays large, as the force of contact is left out of b: what SOLVED leaves of it would never fall.
     """
     x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
-    count, per, rhs, solution = contact.counts.nodes, unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    count, per = contact.counts.nodes, unknowns(contact)
     begin = first_node(contact)
     prepare_sweep(work.X, work.W, contact.sweep, begin, contact.z.shape[0] - 1)
     begin = first_moved(rolling, begin)
@@ -196,9 +228,7 @@ def find_solution(ends, contact, work, carried, rolling):
             V[0, per * k + j] = y
             s += y * y
     s = math.sqrt(s)
-    for i in range(MOST_PRODUCTS + 1):
-        H[i, rhs] = 0.0
-    H[0, rhs] = s
+    begin_columns(H, s)
     done = 0
     if s > 0.0:
         for i in range(per * count):
@@ -216,18 +246,8 @@ def find_solution(ends, contact, work, carried, rolling):
             left = rotate_column(H, done)
             done += 1
             contact.counts.products += 1
-    for j in range(done - 1, -1, -1):
-        s = H[j, rhs]
-        for k in range(j + 1, done):
-            s -= H[j, k] * H[k, solution]
-        H[j, solution] = s / H[j, j]
-    for k in range(count):
-        i = contact.nodes[k]
-        for m in range(per):
-            s = 0.0
-            for j in range(done):
-                s += H[j, solution] * V[j, per * k + m]
-            x[i, m] = s / length_of(contact, m, i)
+    solve_columns(H, done)
+    combine_vectors(contact, H, done)
     return True
 
 

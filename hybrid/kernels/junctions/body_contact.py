@@ -43,6 +43,7 @@ from hybrid.kernels.junctions.borders import (
     push_node,
     put_corrections,
 )
+from hybrid.kernels.junctions.joined_lines import factor_dense, substitute_dense
 from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
 from hybrid.kernels.junctions.network_job import read_system
 from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, put_vector, row3, transposed
@@ -92,8 +93,7 @@ class MeetingJob(NamedTuple):
     moved: Rows  # (B, 6) and of bodies
     responses: Blocks  # (12 S, T, 5) of lines
     turned: Blocks  # (12 S, B, 6) of bodies
-    coupling: Rows  # (12 S, 12 S + 1)
-    order: NDArray[np.int64]  # (12 S,) exchanges of its rows
+    coupling: Rows  # (12 S + 5, 12 S + 1), as kernels.junctions.joined_lines.factor_dense has it
     rank: int = 0
 
 
@@ -331,11 +331,11 @@ def touches(job, r):
 @inner
 def apply(system, job):
     """Couple corrections that were found without P and Q: less the responses times z and y."""
-    last = job.coupling.shape[0]
+    last = job.coupling.shape[1] - 1
     for r in range(last):
         job.coupling[r, last] = 0.0
     select(system, job, last)
-    substitute_small(job.coupling, job.order)
+    substitute_dense(job.coupling, last)
     for r in range(last):
         if touches(job, r):
             add_corrections(system, -job.coupling[r, last], job.responses[r], job.turned[r])
@@ -344,7 +344,7 @@ def apply(system, job):
 @inner
 def couple(system, job):
     """Couple the corrections of lines and bodies that touch; 0: that fails."""
-    last = job.coupling.shape[0]
+    last = job.coupling.shape[1] - 1
     if job.found[0] == 0:
         return 1.0
     keep_corrections(system, job.kept, job.moved)
@@ -358,50 +358,11 @@ def couple(system, job):
             return 0.0
         keep_corrections(system, job.responses[r], job.turned[r])
         select(system, job, r)
-    if not factor_small(job.coupling, job.order):
+    if not factor_dense(job.coupling, last):
         return 0.0
     put_corrections(system, job.kept, job.moved)
     apply(system, job)
     return 1.0
-
-
-@inner
-def factor_small(A, order):
-    """Factor a dense system (n, n + 1) with row exchanges, which are kept in order (n,); False: it is singular."""
-    n = A.shape[0]
-    for c in range(n):
-        where = c
-        for r in range(c + 1, n):
-            if abs(A[r, c]) > abs(A[where, c]):
-                where = r
-        if not abs(A[where, c]) > 0.0:
-            return False
-        order[c] = where
-        if where != c:
-            for j in range(n):
-                A[c, j], A[where, j] = A[where, j], A[c, j]
-        for r in range(c + 1, n):
-            A[r, c] /= A[c, c]
-            if A[r, c] != 0.0:
-                for j in range(c + 1, n):
-                    A[r, j] -= A[r, c] * A[c, j]
-    return True
-
-
-@inner
-def substitute_small(A, order):
-    """Solve a system that `factor_small` has factored for its last column, which becomes the solution."""
-    n = A.shape[0]
-    for c in range(n):
-        if order[c] != c:
-            A[c, n], A[order[c], n] = A[order[c], n], A[c, n]
-    for c in range(n):
-        for r in range(c + 1, n):
-            A[r, n] -= A[r, c] * A[c, n]
-    for c in range(n - 1, -1, -1):
-        for j in range(c + 1, n):
-            A[c, n] -= A[c, j] * A[j, n]
-        A[c, n] /= A[c, c]
 
 
 @kernel

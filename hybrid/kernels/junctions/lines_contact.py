@@ -36,12 +36,15 @@ from hybrid.kernels.contact.self_contact_pairs import (
     WITHIN_LINE,
 )
 from hybrid.kernels.contact.self_contact_solve import (
+    begin_columns,
+    combine_vectors,
     enough,
     find_forces,
     inner_product,
     length_of,
     load_vector,
     rotate_column,
+    solve_columns,
     unknowns,
 )
 from hybrid.kernels.junctions.borders import (
@@ -476,35 +479,17 @@ def set_unknowns(system, job, column):
 
 
 @inner
-def combine(system, job, done):
-    """contact.x of all lines: the vectors of the basis with the solution of the least-squares problem."""
-    H, solution = job.hessenberg, MOST_PRODUCTS + 3
-    for l in range(system.tables.shape[0]):
-        if touching(system, job, l) > 0:
-            contact = read_contact(job.contacts[l]).contact
-            per = unknowns(contact)
-            for k in range(contact.counts.nodes):
-                i = contact.nodes[k]
-                for m in range(per):
-                    s = 0.0
-                    for j in range(done):
-                        s += H[j, solution] * contact.basis[j, per * k + m]
-                    contact.x[i, m] = s / length_of(contact, m, i)
-
-
-@inner
 def find_solution(system, job):
     """GMRES from zero: contact.x = the correction of the nodes in contact of all lines; False: not finite."""
-    H, rhs, solution = job.hessenberg, MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    H = job.hessenberg
     unknown, width = prepare_sweeps(system, job)
     set_unknowns(system, job, -1)
     if not respond(system, job, True):
         return False
     put_response(system, job, 0, True)
-    for i in range(MOST_PRODUCTS + 1):
-        H[i, rhs] = 0.0
     s = math.sqrt(product(system, job, 0, 0))
-    H[0, rhs], left, done = s, s, 0
+    begin_columns(H, s)
+    left, done = s, 0
     if s > 0.0:
         add_vector(system, job, 0, 1.0 / s, 0)
         most = enough(s, width, unknown)
@@ -522,12 +507,10 @@ def find_solution(system, job):
                 add_vector(system, job, done + 1, 1.0 / size, done + 1)
             left = rotate_column(H, done)
             done += 1
-    for j in range(done - 1, -1, -1):
-        s = H[j, rhs]
-        for k in range(j + 1, done):
-            s -= H[j, k] * H[k, solution]
-        H[j, solution] = s / H[j, j]
-    combine(system, job, done)
+    solve_columns(H, done)
+    for l in range(system.tables.shape[0]):
+        if touching(system, job, l) > 0:
+            combine_vectors(read_contact(job.contacts[l]).contact, H, done)
     return True
 
 

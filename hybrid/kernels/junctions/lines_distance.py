@@ -100,23 +100,12 @@ def add_motion(moved, before, after):
 
 
 @inner
-def box_of(before, after, first, last):
-    """Lowest and highest of the nodes from the first to the last on their ways in a step."""
+def box_of(before, after, first, last, ahead):
+    """Lowest and highest of the nodes from the first to the last on their ways in a step, and in `ahead` more like it."""
     low, high = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf)
     for i in range(first, last + 1):
         a, b = get3(before, i), get3(after, i)
-        low = (min(low[0], min(a[0], b[0])), min(low[1], min(a[1], b[1])), min(low[2], min(a[2], b[2])))
-        high = (max(high[0], max(a[0], b[0])), max(high[1], max(a[1], b[1])), max(high[2], max(a[2], b[2])))
-    return low, high
-
-
-@inner
-def whole_box(before, after):
-    """Lowest and highest of all nodes on their ways in a step, and in AHEAD more like it."""
-    low, high = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf)
-    for i in range(after.shape[0]):
-        a, b = get3(before, i), get3(after, i)
-        c = add(b, scale(AHEAD, sub(b, a)))  # beyond b as seen from a
+        c = add(b, scale(ahead, sub(b, a)))  # beyond b as seen from a
         low = (min(low[0], min(a[0], c[0])), min(low[1], min(a[1], c[1])), min(low[2], min(a[2], c[2])))
         high = (max(high[0], max(a[0], c[0])), max(high[1], max(a[1], c[1])), max(high[2], max(a[2], c[2])))
     return low, high
@@ -131,7 +120,7 @@ def find_boxes(job):
         n = line_job.line.h.shape[0]
         for i in range(job.begins[l], job.begins[l] + n):
             widest = max(widest, job.width[i])
-        low, high = whole_box(line_job.old.r, line_job.new.r)
+        low, high = box_of(line_job.old.r, line_job.new.r, 0, n, AHEAD)
         margin = (0.5 + LEAST_APART) * widest
         for k in range(3):
             moved[l, LOW + k], moved[l, HIGH + k] = low[k] - margin, high[k] + margin
@@ -243,11 +232,11 @@ def search(job, row, a, b, reach):
     at_joint = math.inf  # the least clearance of what is near a joint, where one line lies against what holds the other
     for first in range(0, n, BOX):
         last = min(first + BOX, n)
-        low, high = box_of(one.old.r, one.new.r, first, last)
+        low, high = box_of(one.old.r, one.new.r, first, last, 0.0)
         widest = widest_of(job, a, first, last)
         for second in range(0, m, BOX):
             end, ahead = min(second + BOX, m), -math.inf  # within which cells of these boxes may be near
-            lower, higher = box_of(two.old.r, two.new.r, second, end)
+            lower, higher = box_of(two.old.r, two.new.r, second, end, 0.0)
             width = 0.5 * (widest + widest_of(job, b, second, end))
             gap = boxes_apart(low, high, lower, higher) - width
             if gap < reach and not near:

@@ -34,13 +34,12 @@ from hybrid.kernels.algebra.rotations import (
 )
 from hybrid.kernels.laws.element import chord, frames_at, relative_rotation, turning
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.mesh.remesh import FIRST, PER_LENGTH
-from hybrid.kernels.reel.paid_length import cell, flows, growing, lack_rate, node, shift_layers
+from hybrid.kernels.mesh.remesh import COMPLIANCE
+from hybrid.kernels.reel.paid_length import cell, flows, growing, lack_rate, node, piece_at, shift_layers
 from hybrid.kernels.reel.reel import FLOW, LENGTH_OF, STRAIN_OF, TURN_FLOW
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A, NET_A, STIFFNESS_DAMPING_POWER
 
 Z3 = (0.0, 0.0, 0.0)
-COMPLIANCE = 1 + FIRST + PER_LENGTH.index("ck")  # column of Reel.pieces
 
 
 # --- strain ---------------------------------------------------------------------------------------
@@ -62,10 +61,7 @@ def elastic_tension(line, state, i):
 @inner
 def compliance_at(line, reel, j):
     """Compliance, 1/N, of the material at node j."""
-    place, k = reel.numbers.side * (line.s[node(line, reel, j)] - reel.numbers.far), 0
-    while k + 1 < reel.pieces.shape[0] and reel.pieces[k + 1, 0] <= place:
-        k += 1
-    return reel.pieces[k, COMPLIANCE]
+    return reel.pieces[piece_at(reel, line.s[node(line, reel, j)]), 1 + COMPLIANCE]
 
 
 @inner

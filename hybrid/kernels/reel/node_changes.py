@@ -16,7 +16,7 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_changes import begin_anew, clear
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, RemeshPlaces, copy_cell, copy_node, move_line
-from hybrid.kernels.reel.paid_length import cell, node, prepare
+from hybrid.kernels.reel.paid_length import cell, node, piece_at, prepare
 from hybrid.kernels.reel.payout_nodes import CarryJob, move_row, place_reel
 from hybrid.kernels.reel.reel import Reel
 from hybrid.kernels.reel.winch import Winch, at_its_end
@@ -103,15 +103,6 @@ def join_column(extremes, bounds, column, at):
             bounds[0, row, at], bounds[2, row, at] = x, extremes[2, row, column]
         if np.isfinite(y) and y > bounds[1, row, at]:
             bounds[1, row, at], bounds[3, row, at] = y, extremes[3, row, column]
-
-
-@inner
-def piece_at(reel, s):
-    """The piece of the material at an arc length."""
-    place, k = reel.numbers.side * (s - reel.numbers.far), 0
-    while k + 1 < reel.pieces.shape[0] and reel.pieces[k + 1, 0] <= place:
-        k += 1
-    return k
 
 
 @inner

@@ -73,10 +73,7 @@ from hybrid.kernels.laws.tension_torque import couples
 from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.mesh.remesh import B_1, COLUMNS, fill_cell, fill_element, fill_node
-from hybrid.kernels.reel.reel import (
-    LENGTH_OF,
-    STRAIN_OF,
-)
+from hybrid.kernels.reel.reel import LENGTH_OF, STRAIN_OF
 from hybrid.kernels.state.report import BENDING_LAW, ROTARY, VORTICES
 from hybrid.kernels.watch.extremes import moment_at
 
@@ -137,6 +134,15 @@ def cell(line, reel, c):
 def place_of(line, reel, i):
     """Place, m, of a node."""
     return reel.numbers.side * (line.s[node(line, reel, i)] - reel.numbers.far)
+
+
+@inner
+def piece_at(reel, s):
+    """The piece of the material at an arc length."""
+    place, k = reel.numbers.side * (s - reel.numbers.far), 0
+    while k + 1 < reel.pieces.shape[0] and reel.pieces[k + 1, 0] <= place:
+        k += 1
+    return k
 
 
 @inner

@@ -17,18 +17,14 @@ A run calls `pay_out` by its address (kernels.run.network_run), so that lines of
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.element import Chord, Rates, chord
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.reel.damping import (
-    correct_damping_power,
-    correct_end,
-    power_of_flow,
-    put_flow_on,
-)
+from hybrid.kernels.reel.damping import correct_damping_power, correct_end, power_of_flow, put_flow_on
 from hybrid.kernels.reel.paid_length import (
     cell,
     eased,
@@ -57,12 +53,7 @@ from hybrid.kernels.reel.payout_work import (
     rubs,
     work_of_balance,
 )
-from hybrid.kernels.reel.reel import (
-    FEWEST_STEPS,
-    MOVES,
-    WAITS,
-    read,
-)
+from hybrid.kernels.reel.reel import FEWEST_STEPS, MOVES, WAITS, read
 from hybrid.kernels.reel.winch import (
     accept,
     answer_of_cell,
@@ -113,19 +104,40 @@ def velocity_at(line, state, reel, i, rate, g):
     return sub(v, scale(rate, slope))
 
 
-@called
-def of_material(line, sea, ends, state, reel, i):
-    """What the force on node i, N, is more because it does not move as the material does, and r' there."""
-    n, numbers, g = line.h.shape[0], reel.numbers, growing(line, reel)
-    rate, acceleration, j = numbers.rate, numbers.acceleration, min(i, n - 1)
+class Way(NamedTuple):
+    """How the line lies at a node and how its material goes there: r', r'', velocity, and the rate of r'."""
+
+    slope: tuple[float, float, float]
+    bend: tuple[float, float, float]
+    v: tuple[float, float, float]
+    turns: tuple[float, float, float]
+
+
+@inner
+def way_at(line, state, reel, i, rate, g):
+    """The `Way` at node i, where line comes at a rate, m/s, behind cell g."""
+    j = min(i, line.h.shape[0] - 1)
     slope, bend = slope_at(line, state, reel, i)
     ha, hb = lengths_at(line, reel, j)
     first, middle = velocity_at(line, state, reel, j - 1, rate, g), velocity_at(line, state, reel, j, rate, g)
     last = velocity_at(line, state, reel, j + 1, rate, g)
     va, vb = scale(1.0 / ha, sub(middle, first)), scale(1.0 / hb, sub(last, middle))
     part, v = (ha / (ha + hb), middle) if i == j else (1.0 + hb / (ha + hb), last)
-    turns = add(va, scale(part, sub(vb, va)))
-    K = add(scale(2.0 * rate, turns), add(scale(rate * rate, bend), scale(acceleration, slope)))
+    return Way(slope, bend, v, add(va, scale(part, sub(vb, va))))
+
+
+@inner
+def left_behind(way, c, q):
+    """Acceleration by which a node is ahead of material that comes at the rate c, m/s, which grows by q, m/s2."""
+    return add(scale(2.0 * c, way.turns), add(scale(c * c, way.bend), scale(q, way.slope)))
+
+
+@called
+def of_material(line, sea, ends, state, reel, i):
+    """What the force on node i, N, is more because it does not move as the material does, and r' there."""
+    n, numbers = line.h.shape[0], reel.numbers
+    way = way_at(line, state, reel, i, numbers.rate, growing(line, reel))
+    K = left_behind(way, numbers.rate, numbers.acceleration)
     k, z = node(line, reel, i), ends.position[end_of(reel), 2]
     before, after = Chord(Z3, 0.0, 0.0), Chord(Z3, 0.0, 0.0)
     if k > 0:
@@ -138,9 +150,9 @@ def of_material(line, sea, ends, state, reel, i):
         z -= numbers.side * state.e[cell(line, reel, c), 2]
     vi, ai = get3(state.v, k), get3(state.vd, k)
     rates = Rates(0.0, 0.0)
-    with_material, _, _, _ = inertia_and_water(line, sea, k, z, v, sub(ai, K), before, after, rates, reel.report)
+    with_material, _, _, _ = inertia_and_water(line, sea, k, z, way.v, sub(ai, K), before, after, rates, reel.report)
     with_node, _, _, _ = inertia_and_water(line, sea, k, z, vi, ai, before, after, rates, reel.report)
-    return sub(with_material, with_node), slope
+    return sub(with_material, with_node), way.slope
 
 
 @inner

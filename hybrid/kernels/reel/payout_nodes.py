@@ -17,17 +17,18 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import has_law, strain_and_energy
 from hybrid.kernels.laws.soil import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
+from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.references import reader
+from hybrid.kernels.machine.references import reader, rows
 from hybrid.kernels.mesh.remesh import COMPLIANCE
 from hybrid.kernels.reel.damping import strain_at
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, place_of
-from hybrid.kernels.reel.payout import slope_at, velocity_at
+from hybrid.kernels.reel.payout import chord_at, left_behind, way_at
 from hybrid.kernels.reel.payout_work import put_travels
 from hybrid.kernels.reel.reel import ENTERS, FEWEST_STEPS, LEAVES, Reel
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
-from hybrid.kernels.state.state import Floats, Line, Rows, State, blanks
+from hybrid.kernels.state.state import NO_SOIL, Floats, Line, Rows, State, blank_state, blanks
 from hybrid.kernels.step.step_control import lead
 
 
@@ -90,6 +91,13 @@ def put_places(reel, nodes, count):
 
 # --- the state ------------------------------------------------------------------------------------
 
+# Of the fields of nodes and of cells in a state: where they are in its table, and their columns.
+_at = places(blank_state(1))
+_COLUMNS = {3: ("r", "v", "a", "vd", "slip", "bed", "e", "a1"), 1: ("T", "w", "wa", "wd", "slow", "peak"), 4: ("wake",)}
+_COLUMNS[NO_SOIL.shape[1]] = ("soil",)
+MOVED = np.array([(_at[name], columns) for columns, names in _COLUMNS.items() for name in names], np.int64)
+of_state = rows(blank_state(1))
+
 
 @kernel
 def move_row(old, new, forward, cut, step):
@@ -117,30 +125,11 @@ def move_rows(old, new, forward, cut, step):
 @inner
 def move_state(state, out, forward, cut, step):
     """Nodes and cells that stay; those that are new have the values of their neighbours."""
-    move_rows(state.r, out.r, forward, cut, step)
-    move_rows(state.v, out.v, forward, cut, step)
-    move_rows(state.a, out.a, forward, cut, step)
-    move_rows(state.vd, out.vd, forward, cut, step)
-    move_rows(state.slip, out.slip, forward, cut, step)
-    move_rows(state.bed, out.bed, forward, cut, step)
-    move_rows(state.e, out.e, forward, cut, step)
-    move_rows(state.a1, out.a1, forward, cut, step)
-    move_row(state.T, out.T, forward, cut, step)
-    move_row(state.w, out.w, forward, cut, step)
-    move_row(state.wa, out.wa, forward, cut, step)
-    move_row(state.wd, out.wd, forward, cut, step)
-    if state.slow.shape[0] > 0:
-        move_row(state.slow, out.slow, forward, cut, step)
-    if state.peak.shape[0] > 0:
-        move_row(state.peak, out.peak, forward, cut, step)
-    if state.wake.shape[0] > 0:
-        move_rows(state.wake, out.wake, forward, cut, step)
-    if state.grip.shape[0] > 0:
-        move_rows(state.grip, out.grip, forward, cut, step)
-    if state.soil.shape[0] > 0:
-        move_rows(state.soil, out.soil, forward, cut, step)
-    if state.layers.shape[0] > 0:
-        move_rows(state.layers, out.layers, forward, cut, step)
+    for k in range(MOVED.shape[0]):
+        at, columns = MOVED[k, 0], MOVED[k, 1]
+        move_rows(of_state(state, at, columns), of_state(out, at, columns), forward, cut, step)
+    move_rows(state.grip, out.grip, forward, cut, step)
+    move_rows(state.layers, out.layers, forward, cut, step)
     for k in range(state.sheave.shape[0]):
         for j in range(state.sheave.shape[1]):
             out.sheave[k, j] = state.sheave[k, j]
@@ -152,12 +141,6 @@ def move_state(state, out, forward, cut, step):
 @inner
 def put(x, i, value):
     x[i, 0], x[i, 1], x[i, 2] = value
-
-
-@inner
-def chord_at(line, state, reel, c):
-    """Chord of a cell, towards the fairlead."""
-    return scale(reel.numbers.side, get3(state.e, cell(line, reel, c)))
 
 
 @inner
@@ -181,20 +164,10 @@ def flow_at(reel, clock):
 @inner
 def material_at(line, state, reel, flow, g):
     """Velocity, algorithmic and true acceleration of the material at the first node behind the cell that grows."""
-    i, j = g + 1, min(g + 1, line.h.shape[0] - 1)
-    ha, hb = line.h[cell(line, reel, j - 1)], line.h[cell(line, reel, j)]
-    slope, bend = slope_at(line, state, reel, i)
-    v = velocity_at(line, state, reel, i, flow.rate, g)
-    first, middle = velocity_at(line, state, reel, j - 1, flow.rate, g), velocity_at(line, state, reel, j, flow.rate, g)
-    last = velocity_at(line, state, reel, j + 1, flow.rate, g)
-    va, vb = scale(1.0 / ha, sub(middle, first)), scale(1.0 / hb, sub(last, middle))
-    part = ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)
-    turns = add(va, scale(part, sub(vb, va)))
-    k, c, q = node(line, reel, i), flow.later_rate, flow.later_acceleration
-    then = add(scale(2.0 * c, turns), add(scale(c * c, bend), scale(q, slope)))
-    c, q = flow.rate, flow.acceleration
-    now = add(scale(2.0 * c, turns), add(scale(c * c, bend), scale(q, slope)))
-    return v, sub(get3(state.a, k), then), sub(get3(state.vd, k), now)
+    way, k = way_at(line, state, reel, g + 1, flow.rate, g), node(line, reel, g + 1)
+    then = left_behind(way, flow.later_rate, flow.later_acceleration)
+    now = left_behind(way, flow.rate, flow.acceleration)
+    return way.v, sub(get3(state.a, k), then), sub(get3(state.vd, k), now)
 
 
 @inner

@@ -594,7 +594,7 @@ def blanks(of: type[Arguments]) -> Callable[[], Arguments]:
 def _blank_value(of: Any) -> Any:
     """A value of a type; of a class that is kept by reference arrays of its own, as its example has them."""
     if of in examples:
-        return _copied(examples[of])
+        return copied(examples[of])
     if hasattr(of, "_field_defaults"):
         kinds = get_type_hints(of, include_extras=True)
         return of(**{name: _blank_value(kind) for name, kind in kinds.items()} | of._field_defaults)
@@ -604,7 +604,8 @@ def _blank_value(of: Any) -> Any:
     return np.zeros((0,) * dimensions, get_args(get_args(kind)[1])[0])
 
 
-def _copied(value: Any) -> Any:
+def copied(value: Any) -> Any:
+    """The same in arrays of its own, of a NamedTuple of arrays and numbers."""
     if isinstance(value, tuple):
-        return type(value)(*map(_copied, value))
+        return type(value)(*map(copied, value))
     return value.copy() if isinstance(value, np.ndarray) else value
