@@ -44,7 +44,7 @@ from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.diagnostics import Diagnostics, LineStep, Stop
 from hybrid.simulation.events import FASTEST, EventLog, borne_strain, energy_gains_text, note_laid, stretch_text
-from hybrid.simulation.lines_contact import LinesWatch, LineWatch, diameters, least_bending
+from hybrid.simulation.lines_contact import LinesWatch, diameters, least_bending
 from hybrid.simulation.remesh import Around, HasPlane
 from hybrid.simulation.result_file import Envelope, marked_places, marks_on
 from hybrid.simulation.run_sample import COMPARED
@@ -164,7 +164,8 @@ class LineResult:
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self.marked = marked_places(scene, model)
         self.envelope.itself.on &= wanted.record is not None or bool(model.line.bits & MAY_TOUCH)
-        self._itself = LineWatch(self.envelope.itself, model)
+        self._itself = self.envelope.itself
+        self._itself.renew(model)
         self.lets_touch = True  # whether contact begins by itself where the line comes near itself
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
         self.has_neared_itself = False  # whether that was so at some time
@@ -328,7 +329,7 @@ class LineResult:
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.books.hinges[:] = model.hinges
         self.diagnostics.use_model(model)
-        self._itself = LineWatch(self.envelope.itself, model)
+        self._itself.renew(model)
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
 

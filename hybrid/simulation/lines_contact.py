@@ -128,30 +128,33 @@ def touching_text(s: float, other: float, distance: float, width: float) -> str:
 
 
 class SelfWatch:
-    """Watches one line for as long as a run lasts; a line without a diameter is not watched."""
+    """Watches one line for as long as a run lasts, in its steps and in states that are handed over.
 
-    def __init__(self, model: Model, why: str = "statics compute no contact", remedy: str = REMEDY) -> None:
-        """why: no contact is computed, for an event; remedy: what computes it."""
-        self.on, self.why, self.remedy = bool(diameters(model).any()), why, remedy
+    A line without a diameter is not watched.
+    """
+
+    def __init__(self, model: Model, why: str = "statics compute no contact") -> None:
+        """why: no contact is computed, for an event; `renew` before the first step."""
+        self.on, self.why = bool(diameters(model).any()), why
         self.asks = False  # whether it is asked when the line comes near itself, so that contact begins
         self.itself = blank_itself(np.ones(1))
         self._touches = False  # whether contact is computed
+        self._model = model
+        self._job: Table | None = None
+        self.running: Table | None = None  # of the steps of a run
+        self.is_bent = False
 
     def renew(self, model: Model) -> None:
         """Go on with the cells of a model; events tell of contact from now on where it is computed."""
+        self._model, self._job, self.running, self.is_bent = model, None, None, False
+        if not self.on:
+            return
         self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
         self._touches = bool(model.line.bits & SELF_CONTACT)
         self.itself.found.meeting = OUTER - 1.0 if self._touches else 0.0
         self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
         ends = self._touches and bool(model.line.bits & MAY_TOUCH)
         self.itself.ahead.asked = 1.0 if self.asks else WIDER if ends else -1.0
-
-    def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
-        """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
-        self.itself.ahead.seconds = step
-        found = look()
-        self.itself.ahead.seconds, self.itself.found.told, self.itself.found.hidden = 0.0, 0.0, ENDS
-        return bool(found & NEARS)
 
     def begins(self, t: float, model: Model, event: Callable[..., None] | None) -> None:
         """Contact is computed from now on; event: as of `tell`, None where nobody is told."""
@@ -169,9 +172,9 @@ class SelfWatch:
         """Contact is not computed again before parts have come apart; where they meet until then, that is told."""
         self.itself.found.waits, self.itself.found.told = 1.0, 0.0
 
-    def report_hidden(self, t: float, model: Model, state: State, event: Callable[..., None]) -> None:
+    def report_hidden(self, t: float, state: State, event: Callable[..., None]) -> None:
         """An event for a bend that hides how near parts are."""
-        ahead = self.itself.ahead
+        ahead, model = self.itself.ahead, self._model
         i, j, node = int(ahead.hidden_i), int(ahead.hidden_j), int(ahead.sharp)
         s = float(model.line.s[node])
         event(t, s, s, "unresolved bend", hidden_text(model, state, i, j, node))
@@ -192,7 +195,7 @@ class SelfWatch:
             text = touching_text(s, other, distance, width)
             event(t, s, other, "line touches itself", text, value=distance, threshold=width)
         else:
-            why, remedy = self.why, self.remedy
+            why, remedy = self.why, REMEDY
             if self.asks and found.waits > 0.0:
                 why, remedy = GIVEN_UP, "shorter cells"
             elif self.asks and found.hidden == 0.0:
@@ -231,27 +234,12 @@ class SelfWatch:
         near = self.on and math.isfinite(found.least)
         return {x.name: np.array(getattr(found, FIELDS[x.name][0]) if near else np.nan) for x in self.fields()}
 
-
-class LineWatch:
-    """Watches one of several lines, in the steps of their run and in states that are handed over."""
-
-    def __init__(self, watch: SelfWatch, model: Model) -> None:
-        """watch: what is known of the line so far, which goes on on the cells of `model`."""
-        self._watch, self._model = watch, model
-        self._job: Table | None = None
-        self.running: Table | None = None  # of the steps of a run
-        self._address, self.is_bent = 0, False
-        if watch.on:
-            watch.renew(model)
-
-    def _bind(self) -> Table:
-        """Get ready for the kernel, when the line is so bent for the first time that it could come near itself."""
+    def _bound(self, states: tuple[State, State], clock: Clock, counts: Counts) -> Table:
+        """What the kernel gets, of two states in turn."""
         model, job = self._model, Table(blank_itself_job)
-        self._now, self._before = state_for(model.line), state_for(model.line)
-        self._clock = Clock()
         job.bind(
-            line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,
-            counts=Counts(), itself=self._watch.itself,
+            line=model.line, ends=model.ends.values, old=states[0], new=states[1], clock=clock, counts=counts,
+            itself=self.itself,
         )  # fmt: skip
         return job
 
@@ -260,18 +248,11 @@ class LineWatch:
 
         clock, counts: of the run (kernels.state.books).
         """
-        if not self._watch.on:
+        if not self.on:
             return {"itself": 0}
-        job = Table(blank_itself_job)
-        model = self._model
-        job.bind(
-            line=model.line, ends=model.ends.values, old=states[0], new=states[1], clock=clock, counts=counts,
-            itself=self._watch.itself,
-        )  # fmt: skip
-        self.running = job
-        if self.is_bent:
-            self._address = watch_itself.address(job.numbers)
-        return {"itself": self._address if self.is_bent else UNBENT, "itself_table": job.numbers}
+        self.running = self._bound(states, clock, counts)
+        numbers = self.running.numbers
+        return {"itself": watch_itself.address(numbers) if self.is_bent else UNBENT, "itself_table": numbers}
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with a line of other cells, of which steps know."""
@@ -288,18 +269,16 @@ class LineWatch:
         """A line of a run is bent, so that every step looks from now on: bits of the last, and its job."""
         self.is_bent, job = True, self.running
         assert job is not None
-        self._address = watch_itself.address(job.numbers)
-        return int(watch_itself(job.numbers)), {"itself": self._address}
+        return int(watch_itself(job.numbers)), {"itself": watch_itself.address(job.numbers)}
 
     def check(self, t: float, state: State, event: Callable[..., None]) -> int:
         """As `judge`, of a state at t (s) from which no step has been made."""
-        watch = self._watch
-        if not watch.on:
+        if not self.on:
             return 0
-        if not is_bent(state) and watch.itself.ahead.asked != WIDER:
-            watch.itself.found.told = 0.0
+        if not is_bent(state) and self.itself.ahead.asked != WIDER:
+            self.itself.found.told = 0.0
             return 0
-        return self.judge(self._search(t, state, state.r), t, 0.0, state, event)
+        return self.judge(self._search(t, state), t, 0.0, state, event)
 
     def judge(self, found: int, t: float, dt: float, state: State, event: Callable[..., None]) -> int:
         """Report surfaces that have met in the step of dt (s) to a state at t (s), or a bend that hides it.
@@ -307,27 +286,31 @@ class LineWatch:
         found: bits of the search.  Returns NEARS where the line is so near itself, in place of an event, that its
         contact has to begin, PARTS where it may end.
         """
-        told = self._watch.itself.found
+        told = self.itself.found
         if found & HIDES:
-            self._watch.report_hidden(t, self._model, state, event)
+            self.report_hidden(t, state, event)
         if found & NEARS:
             told.told = 0.0 if found & MEETS else told.told
         elif found & MEETS:
-            self._watch.report(t, dt, event)
+            self.report(t, dt, event)
         return found & (NEARS | PARTS)
 
     def is_near(self, t: float, state: State, step: float) -> bool:
         """Whether a line that may touch itself is near itself at t (s), from which a step (s) is to be made."""
-        watch = self._watch
-        if not (watch.on and watch.asks and is_bent(state)):
+        if not (self.on and self.asks and is_bent(state)):
             return False
-        return watch.foresees(state, step, lambda: self._search(t, state, state.r))
+        ahead, found = self.itself.ahead, self.itself.found
+        ahead.seconds = step
+        seen = self._search(t, state)
+        ahead.seconds, found.told, found.hidden = 0.0, 0.0, ENDS
+        return bool(seen & NEARS)
 
-    def _search(self, t: float, state: State, before: Floats) -> int:
+    def _search(self, t: float, state: State) -> int:
         """MEETS and NEARS of kernels.contact.self_distance."""
-        if self._job is None:
-            self._job = self._bind()
-        self._now.r[:], self._now.e[:], self._now.v[:], self._before.r[:] = state.r, state.e, state.v, before
+        if self._job is None:  # when the line is so bent for the first time that it could come near itself
+            self._now, self._before, self._clock = state_for(self._model.line), state_for(self._model.line), Clock()
+            self._job = self._bound((self._now, self._before), self._clock, Counts())
+        self._now.r[:], self._now.e[:], self._now.v[:], self._before.r[:] = state.r, state.e, state.v, state.r
         self._clock.now = t
         return int(watch_itself(self._job.numbers))
 

@@ -11,7 +11,6 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.state.report import SELF_CONTACT
-from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.nearby import refined
 from hybrid.model.network import NetworkModel
@@ -88,7 +87,8 @@ def _on_planned_cells(model: NetworkModel, found: LinesAtRest, managers: Mapping
             others[k] = on_layout(old, old.layout._replace(here=here))
             states[k] = refined(states[k], old.line, others[k].line)
         model = _with(model, others)
-        found = _solved(model, found, t, states)
+        start = NetworkState(states, found.state.bodies)
+        found = solve_from(found, model, t, found.bodies, start, "the equilibrium of other cells")
         wanted = {k: planned_cells(model.models[k], x, found.state.lines[k], t) for k, x in managers.items()}
         if not any((here & ~before[k]).any() for k, here in wanted.items()):
             return model, found
@@ -98,27 +98,11 @@ def _on_planned_cells(model: NetworkModel, found: LinesAtRest, managers: Mapping
 
 def _with_catenaries(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The same where scenes say that lines are catenary, in the equilibrium with that."""
-    others, states = dict[int, Model](), [*found.state.lines]
+    most = _most_rod(model, found, managers, t)
     for k, manager in managers.items():
-        free, full = manager.given >= 0, model.models[k]
-        if free.all():
-            continue
-        assert full.layout is not None
-        layout = full.layout._replace(rod=free)
-        others[k] = on_layout(full, layout)
-        states[k] = on_fewer(states[k], full.line, others[k].line, full.ends.at_time(t))
-        manager.set_layout(layout)
-    if not others:
-        return model, found
-    model = _with(model, others)
-    return model, _solved(model, found, t, states)
-
-
-def _solved(model: NetworkModel, found: LinesAtRest, t: float, states: list[State]) -> LinesAtRest:
-    bodies = found.bodies
-    return solve_from(
-        found, model, t, bodies, NetworkState(states, found.state.bodies), "the equilibrium of other cells"
-    )
+        if not (manager.given >= 0).all():
+            _use_rods(manager, most[0].models[k])
+    return most
 
 
 class Start(NamedTuple):
@@ -153,9 +137,7 @@ def start_at_rest(
     return Start(*_zones_at_rest(*rest, {k: x for k, x in managers.items() if k not in follow}, t), managers)
 
 
-def _zones_at_rest(
-    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[NetworkModel, LinesAtRest]:
+def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """Zones for the equilibrium of a system whose lines with managers are all rod: rod only where it is needed.
 
     As of one cable (zones.at_start): where the two equilibria are further apart than the tolerance of a line
@@ -183,19 +165,14 @@ def _zones_at_rest(
     return most, rest
 
 
-def _most_rod(
-    model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
-) -> tuple[NetworkModel, LinesAtRest]:
+def _most_rod(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The most rod that scenes let lines have, and its equilibrium, from that of lines that are all rod."""
     free = {k: manager.given >= 0 for k, manager in managers.items()}
-    if all(x.all() for x in free.values()):
-        return model, found
-    return _with_rods(model, found, free, t)
+    some = {k: x for k, x in free.items() if not x.all()}
+    return _with_rods(model, found, some, t) if some else (model, found)
 
 
-def _with_rods(
-    model: NetworkModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float
-) -> tuple[NetworkModel, LinesAtRest]:
+def _with_rods(model: NetworkModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float) -> Rest:
     """Lines of which these base cells are rod, by their numbers, at rest, from lines that are all rod."""
     models, states = [*model.models], [*found.state.lines]
     for k, rod in rods.items():

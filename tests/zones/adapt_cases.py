@@ -14,6 +14,7 @@ import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
 from hybrid.kernels.mesh.zone_transfer import transfer
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.line import line_on
@@ -206,6 +207,49 @@ def weighed(
         manager.ratios[:] = 0.0
     manager.evaluate_criteria(line, sea, ends, state, dt)
     return manager.ratios.copy()
+
+
+class Following(NamedTuple):
+    """A taut line of rods whose cells follow: its manager, the table of its zones, its layout and its state."""
+
+    manager: DomainManager
+    table: Table
+    zones: Layout
+    state: State
+
+    @property
+    def planned(self) -> Layout:
+        """With the nodes that it asks for; for five looks two cells must be too short before they become one."""
+        for _ in range(5):
+            plan_nodes(self.table.numbers)
+        return self.zones._replace(here=self.manager.zones.plan.copy())
+
+
+def followed(
+    shape: Shape, share: float, *, n: int = 8, velocity: Shape | None = None, twist: Floats | None = None,
+    tolerance: float = 1e-2, fineness: float = 1.0, every: int = 1,
+) -> Following:  # fmt: skip
+    """A line of 10 m in n base cells of 64/every cells.
+
+    velocity: across it, m/s of s; twist: (N-1,) rad, from each cell to the next.
+    """
+    what, zones = cable(10.0), layout(np.linspace(0.0, 10.0, n + 1), 64, "R" * n)
+    zones = zones._replace(here=np.arange(n * 64 + 1) % every == 0)
+    line = on(what, zones)
+    state = state_on(line, shape, 1e4)  # taut: the layer is as short as the cells
+    if velocity is not None:
+        state.v[:, 2] = velocity(line.s)
+    if twist is not None:
+        angle = np.append(0.0, np.cumsum(twist))[:, None]
+        state.a1[:] = np.cos(angle) * state.a1 + np.sin(angle) * np.cross(chords(state), state.a1)
+    manager = DomainManager.on_layout(
+        what, zones, np.ones(n, int), 1.0, Allowed(tolerance, share, fineness=fineness), Times(1.0)
+    )
+    manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
+    manager.zones.next_rod[:] = True
+    table = Table(blank_zone_job())
+    table.bind(line=line, new=state, zones=manager.zones)
+    return Following(manager, table, zones, state)
 
 
 def bight() -> dict:

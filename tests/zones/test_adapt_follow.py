@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pytest
-from adapt_cases import along, bight, cable, hanging, helix, layout, on, state_on, still
+from adapt_cases import along, bight, cable, followed, hanging, helix, layout, on, state_on
 from problems import order
 
 import hybrid
@@ -16,8 +16,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine import binding
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
-from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read_arcs
-from hybrid.kernels.state.state import no_sea
+from hybrid.kernels.mesh.zone_step import blank_zone_job, read_arcs
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import one_line
 from hybrid.simulation import zones_at_rest
@@ -37,28 +36,6 @@ TOUCHDOWN = (
     "model={kind: adaptive, force_rod: [[0, 250]], curvature_error: 0.03}", "mesh={cells: 24}",
 )  # fmt: skip
 ZONES = "model={kind: adaptive, curvature_error: 0.05, hold_time: 2.0}"  # by themselves they would not pay so soon
-
-
-def planned(curvature_error, shape, n=8, parts=64, length=10.0, twist=None, rod=True):
-    """The layout that a state on a shape asks for, from the finest mesh.
-
-    twist: (N-1,) rad, from each cell to the next; rod: (n,) what is rod then.
-    """
-    what, zones = cable(length), layout(np.linspace(0, length, n + 1), parts, "R" * n)
-    line = on(what, zones)
-    state = state_on(line, shape, 1e4)  # taut: the layer is as short as the cells
-    if twist is not None:
-        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-        angle = np.append(0.0, np.cumsum(twist))[:, None]
-        state.a1[:] = np.cos(angle) * state.a1 + np.sin(angle) * np.cross(d, state.a1)
-    manager = DomainManager.on_layout(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, curvature_error), Times(1.0))
-    manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
-    manager.zones.next_rod[:] = rod
-    table = Table(blank_zone_job())
-    table.bind(line=line, new=state, zones=manager.zones)
-    for _ in range(5):  # for so long two cells must be too short before they become one
-        plan_nodes(table.numbers)
-    return zones._replace(here=manager.zones.plan.copy())
 
 
 def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
@@ -82,7 +59,7 @@ def test_cells_are_as_long_as_the_curvature_allows(share: float) -> None:
     than a quarter of what that allows; they are dyadic parts, and neighbours differ by little.
     """
     a, at = 0.5, 3.0
-    found = planned(share, hanging(a, at)[0])
+    found = followed(hanging(a, at)[0], share).planned
     s, h = found.nodes, np.diff(found.nodes)
     x = np.linspace(0.0, 10.0, 20001)
     k = a / (a * a + (x - at) ** 2)
@@ -103,13 +80,14 @@ def test_no_cell_of_a_rod_is_twisted_by_more_than_a_quarter_rad() -> None:
     line = on(cable(10.0), layout(np.linspace(0.0, 10.0, 9), 64, "R" * 8))
     rate = np.where(line.s[1:-1] < 5.0, 4.0, 0.01)
     straight = along((1.0, 0.0, 0.0))
-    found = planned(0.1, straight, twist=rate * line.h[1:])
+    found = followed(straight, 0.1, twist=rate * line.h[1:]).planned
     h, middle = np.diff(found.nodes), 0.5 * (found.nodes[1:] + found.nodes[:-1])
     twisted = 4.0 * h[middle < 5.0]
     assert twisted.max() < 0.25 < 4.0 * twisted.min()
     assert h[middle > 7.5].min() > 10.0 * twisted.max() / 4.0
-    left = planned(0.1, straight, twist=rate * line.h[1:], rod=np.arange(8) > 3)
-    assert np.diff(left.nodes)[:2].min() > 1.0
+    left = followed(straight, 0.1, twist=rate * line.h[1:])
+    left.manager.zones.next_rod[:] = np.arange(8) > 3
+    assert np.diff(left.planned.nodes)[:2].min() > 1.0
 
 
 @pytest.mark.parametrize("shape", ["hanging", "helix"])

@@ -331,16 +331,6 @@ def test_frames_do_not_twist():
     assert (out.state.a1[kept] == state.a1[old.rod_cells]).all()
 
 
-def test_parallel_chords_have_the_same_frame():
-    """Along a straight cable there is nothing to carry: every new frame is the one beside it, to the last bits."""
-    what, old = cable(), even(10, "CCCRRCCCCC")
-    state = state_on(on(what, old), along((1, 2, -0.5)))
-    a = state.a1[3]
-    state.a1[:] = np.cos(0.7) * a + np.sin(0.7) * np.cross(chords(state)[3], a)
-    new, _, out = carried(what, old, "CRRRRRRRCC", state)
-    assert np.abs(out.state.a1[new.rod_cells] - state.a1[3]).max() < 1e-14
-
-
 @pytest.mark.parametrize("angle", [0.0, 0.5, -2.0, 3.0])
 def test_closing_twist_is_spread_evenly(angle):
     """Two rods that meet, turned about each other: every element between them takes an equal part."""

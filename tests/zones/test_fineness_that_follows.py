@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from adapt_cases import Z, cable, hanging, layout, on, state_on, still
+from adapt_cases import Z, cable, followed, hanging, layout, on, state_on, still
 
 import hybrid
 from hybrid.accuracy.passes import free_in
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_criteria import EDGE
-from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
 from hybrid.kernels.mesh.zone_transfer import transfer
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, no_sea
@@ -29,25 +28,6 @@ from hybrid.zones.plan import Allowed, Times
 from tests.scenes import cable_scene, pinned_at
 
 
-def planned(shape, fineness=1.0, share=0.02, leaving=(), every=1) -> Floats:
-    """Nodes that a rod of 8 base cells on a shape asks for, from 64/every cells in each; leaving: base cells let go."""
-    what, zones = cable(10.0), layout(np.linspace(0.0, 10.0, 9), 64, "R" * 8)
-    zones = zones._replace(here=np.arange(8 * 64 + 1) % every == 0)
-    line = on(what, zones)
-    state = state_on(line, shape, 1e4)
-    manager = DomainManager.on_layout(
-        what, zones, np.ones(8, int), 1.0, Allowed(1e3, share, fineness=fineness), Times(1.0)
-    )
-    manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
-    manager.zones.next_rod[:] = True
-    manager.zones.leaving[list(leaving)] = True
-    table = Table(blank_zone_job())
-    table.bind(line=line, new=state, zones=manager.zones)
-    for _ in range(5):  # for so long two cells must be too short before they become one
-        plan_nodes(table.numbers)
-    return zones._replace(here=manager.zones.plan.copy()).nodes
-
-
 @pytest.mark.parametrize("share", [0.1, 0.4], ids=["by curvature", "by turn"])
 def test_finer_cells_are_shorter_whatever_their_length_is_by(share: float) -> None:
     """Dyadic parts: at twice the fineness all but the transitions are halves.
@@ -55,7 +35,7 @@ def test_finer_cells_are_shorter_whatever_their_length_is_by(share: float) -> No
     A limit that stayed the same at every fineness would hide its error from runs that are compared.
     """
     shape = hanging(0.8, 5.0)[0]
-    found = [planned(shape, x, share) for x in (0.5, 1.0, 2.0)]
+    found = [followed(shape, share, fineness=x, tolerance=1e3).planned.nodes for x in (0.5, 1.0, 2.0)]
     inner = [x[abs(x - 5.0) < 2.5] for x in found]
     for coarse, fine in pairwise(inner):
         assert set(coarse) <= set(fine)
@@ -74,8 +54,12 @@ def test_no_cells_are_spent_on_the_layer_of_a_hinge() -> None:
         after = np.maximum(s - 5.0, 0.0)
         return np.column_stack([s - after * (1.0 - np.cos(angle)), 0.0 * s, after * np.sin(angle) + 1e-3 * s * s])
 
-    kinked, hinged = (planned(shape, leaving=x, every=16) for x in ((), range(4, 8)))
-    near = [float(np.diff(x)[abs(x[:-1] - 5.0) < 0.5].min()) for x in (kinked, hinged)]
+    near = []
+    for leaving in (slice(0), slice(4, 8)):
+        found = followed(shape, 0.02, tolerance=1e3, every=16)
+        found.manager.zones.leaving[leaving] = True
+        nodes = found.planned.nodes
+        near.append(float(np.diff(nodes)[abs(nodes[:-1] - 5.0) < 0.5].min()))
     assert near[1] > 4.0 * near[0], near
 
 

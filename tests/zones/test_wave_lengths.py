@@ -6,20 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from adapt_cases import along, cable, layout, on, state_on, still
+from adapt_cases import along, followed
 from test_cell_errors import pinned, scene
 
 import hybrid
-from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.mesh import cell_errors as e
 from hybrid.kernels.mesh.cell_errors import TAU, WAVES, know_new_nodes
-from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read, watch_waves
-from hybrid.kernels.state.state import no_sea
+from hybrid.kernels.mesh.zone_step import read, watch_waves
 from hybrid.simulation.restart import zoning_of_today
 from hybrid.store.integrity import Tree
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Times
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHARE = 0.05
@@ -43,20 +39,9 @@ def longest_behind_hinge(part):
     return e.longest_behind_hinge(part)
 
 
-def watched(velocity, fineness=1.0, tolerance=1e-3):
+def watched(velocity, fineness=1.0):
     """A straight line of 10 m with a velocity across it, m/s of s: its manager, table, layout and state."""
-    what, zones = cable(10.0), layout(np.linspace(0.0, 10.0, 9), 64, "R" * 8)
-    line = on(what, zones)
-    state = state_on(line, along((1.0, 0.0, 0.0)), 1e4)
-    state.v[:, 2] = velocity(line.s)
-    manager = DomainManager.on_layout(
-        what, zones, np.ones(8, int), 1.0, Allowed(tolerance, SHARE, fineness=fineness), Times(1.0)
-    )
-    manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
-    manager.zones.next_rod[:] = True
-    table = Table(blank_zone_job())
-    table.bind(line=line, new=state, zones=manager.zones)
-    return manager, table, zones, state
+    return followed(along((1.0, 0.0, 0.0)), SHARE, velocity=velocity, fineness=fineness, tolerance=1e-3)
 
 
 def after(manager, table, time, steps=1):
@@ -74,11 +59,9 @@ def hump(s):
 
 def planned(velocity, **more):
     """Nodes that waves ask for, when they have been there for long."""
-    manager, table, zones, _ = watched(velocity, **more)
-    after(manager, table, 50.0, 50)
-    for _ in range(5):  # for so long two cells must be too short before they become one
-        plan_nodes(table.numbers)
-    return zones._replace(here=manager.zones.plan.copy()).nodes
+    found = watched(velocity, **more)
+    after(found.manager, found.table, 50.0, 50)
+    return found.planned.nodes
 
 
 # --- e_h against errors measured ----------------------------------------------------------------------
