@@ -32,15 +32,12 @@ from hybrid.kernels.algebra.rotations import (
 )
 from hybrid.kernels.junctions.bodies import (
     FRAME,
-    NUMBERS,
     OWN,
     PLACE,
     START,
-    STATE,
     VD,
     WA,
     WD,
-    WORK,
     A,
     N,
     U,
@@ -62,14 +59,9 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.march import left_over_in_space
 from hybrid.kernels.run.network_run import load_bodies
-from hybrid.kernels.state.books import (
-    HEAD,
-    SAMPLE_POSITION,
-    Clock,
-    Counts,
-)
+from hybrid.kernels.state.books import HEAD, SAMPLE_POSITION, Clock, Counts
 from hybrid.kernels.state.report import NET_A, WAVES
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.newton import with_radius
 from hybrid.kernels.step.step_control import scheme
 from hybrid.kernels.watch.tangents import (
@@ -110,16 +102,16 @@ SMALL_TURN = 1e-3
 class OtherBodies(NamedTuple):
     """The bodies of a scene with more of a number, beside those of the run."""
 
-    numbers: Floats  # (B, NUMBERS)
-    fairleads: Floats  # (J, 2, 3) m, of lines that are joined to what moves with them
-    loads: Floats  # as kernels.run.network_run.StepsJob.loads, history
-    history: Floats
-    rates: Floats  # (B, TANGENTS) named above, of the last step's end
-    before: Floats  # the same before the step
-    old: Floats  # (B, STATE)
-    new: Floats
-    work: Floats  # (B, WORK)
-    right: Floats  # (B, 6) what the bodies themselves add to the right-hand side
+    numbers: Rows  # (B, NUMBERS)
+    fairleads: Blocks  # (J, 2, 3) m, of lines that are joined to what moves with them
+    loads: Rows  # as kernels.run.network_run.StepsJob.loads, history
+    history: Rows
+    rates: Rows  # (B, TANGENTS) named above, of the last step's end
+    before: Rows  # the same before the step
+    old: Rows  # (B, STATE)
+    new: Rows
+    work: Rows  # (B, WORK)
+    right: Rows  # (B, 6) what the bodies themselves add to the right-hand side
     h: float
 
 
@@ -130,29 +122,18 @@ class NetworkTangents(NamedTuple):
     odd: NDArray[np.int64]
     joined: NDArray[np.int64]  # (J,) their numbers
     lone: NDArray[np.int64]  # and those of the others
-    lines: NDArray[np.int64]  # (L, ..) tables of a TangentJob each
-    bodies: NDArray[np.int64]  # (P, ..) tables of an OtherBodies each
+    lines: NumberRows  # (L, ..) tables of a TangentJob each
+    bodies: NumberRows  # (P, ..) tables of an OtherBodies each
     clock: Clock
     counts: Counts
     asked: NDArray[np.int64]  # (1,) of `correct_beside`: the number, -1: the lines of the run
     by: Floats  # (2,) cv, ca of `correct_beside`
 
 
-def blank_bodies() -> OtherBodies:
-    """With the types that every one has."""
-    z = np.zeros
-    return OtherBodies(
-        z((1, NUMBERS)), z((1, 2, 3)), z((0, 8)), z((0, 4)), z((1, TANGENTS)), z((1, TANGENTS)), z((1, STATE)),
-        z((1, STATE)), z((1, WORK)), z((1, 6)), 1.0,
-    )  # fmt: skip
+blank_bodies = blanks(OtherBodies)
 
 
-def blank_system_tangents() -> NetworkTangents:
-    """With the types that every one has."""
-    one, two = np.zeros(1, np.int64), np.zeros((1, 1), np.int64)
-    return NetworkTangents(one, one, one, one, two, two, Clock(), Counts(), one, np.zeros(2))
-
-
+blank_system_tangents = blanks(NetworkTangents)
 read_bodies, read_tangents = reader(blank_bodies()), reader(blank_system_tangents())
 
 

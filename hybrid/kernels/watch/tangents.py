@@ -37,24 +37,9 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.assembly_plane import left_over_in_plane
 from hybrid.kernels.march.march import carry_director, left_over_in_space
-from hybrid.kernels.state.books import Books, Clock, Counts, blank_books
+from hybrid.kernels.state.books import Books, Clock, Counts
 from hybrid.kernels.state.report import ASSEMBLED, ROTARY, STIFFNESS_DAMPING, WAVES
-from hybrid.kernels.state.state import (
-    LANES,
-    Ends,
-    Floats,
-    Line,
-    Moves,
-    Sea,
-    State,
-    Work,
-    blank_line,
-    blank_state,
-    no_ends,
-    no_moves,
-    no_sea,
-    no_work,
-)
+from hybrid.kernels.state.state import LANES, Ends, Floats, Line, Moves, NumberRows, Rows, Sea, State, Work, blanks
 from hybrid.kernels.step.accept import keep_past
 from hybrid.kernels.step.sampling import sample_step
 
@@ -212,7 +197,7 @@ class OtherLine(NamedTuple):
     spin_before: Floats  # (N,)
     work: Work
     books: Books  # the clock is that of the run; what is sampled is the other line
-    left: Floats  # (N+1, 5) what its equations leave over
+    left: Rows  # (N+1, 5) what its equations leave over
     sizes: Floats  # (8,) named above
     same_waves: int  # 1 where its waves are those of the run
     h: float
@@ -230,33 +215,19 @@ class TangentJob(NamedTuple):
     own: Work  # the same with a report of what the equations of the line leave over
     clock: Clock
     counts: Counts
-    left: Floats  # (N+1, 5) what the equations of the line leave over
-    last: Floats  # (N+1, 3) m/s2, a of the state that the last step led to
-    ahead: Floats  # (N+1, 3) m, where the prediction of a step leads nodes
-    slopes: Floats  # (N+1, 15) of waves there (kernels.watch.tangents); empty: none are needed
-    lanes: Floats  # (16 + 2 W, LANES) room for them
+    left: Rows  # (N+1, 5) what the equations of the line leave over
+    last: Rows  # (N+1, 3) m/s2, a of the state that the last step led to
+    ahead: Rows  # (N+1, 3) m, where the prediction of a step leads nodes
+    slopes: Rows  # (N+1, 15) of waves there (kernels.watch.tangents); empty: none are needed
+    lanes: Rows  # (16 + 2 W, LANES) room for them
     found: NDArray[np.int64]  # (2,) named above
-    tables: NDArray[np.int64]  # (P, size) of an OtherLine each
+    tables: NumberRows  # (P, size) of an OtherLine each
 
 
-def blank_other() -> OtherLine:
-    """With the types that every one has."""
-    state, z = blank_state(1), np.zeros
-    return OtherLine(
-        blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, state, z(1), state, z(1), no_work(),
-        blank_books(), z((2, 5)), z(TANGENT_SIZES), 0, 1.0,
-    )  # fmt: skip
+blank_other = blanks(OtherLine)
 
 
-def blank_tangent_job() -> TangentJob:
-    """With the types that every one has."""
-    state, z = blank_state(1), np.zeros
-    return TangentJob(
-        blank_line(1), no_sea(1), no_ends(), state, state, no_work(), no_work(), Clock(), Counts(), z((2, 5)),
-        z((2, 3)), z((2, 3)), z((0, SLOPES)), z((PHASES, LANES)), z(2, np.int64), z((1, 1), np.int64),
-    )  # fmt: skip
-
-
+blank_tangent_job = blanks(TangentJob)
 read_other, read_job = reader(blank_other()), reader(blank_tangent_job())
 
 
