@@ -183,6 +183,18 @@ class Model:
     held: Line | None = None  # the line as its ends held it before the first of them was let go
 
     @property
+    def zoned(self) -> Layout:
+        """`layout` of a line whose zones move."""
+        assert self.layout is not None
+        return self.layout
+
+    @property
+    def line_maker(self) -> LineOnBase:
+        """`on_base` of a line whose zones move."""
+        assert self.on_base is not None
+        return self.on_base
+
+    @property
     def mesh(self) -> Layout | tuple[Floats, tuple[Zone, ...]]:
         """What `build` makes a model of the same mesh from."""
         if self.layout is None:

@@ -71,8 +71,7 @@ class CellChanges(Remesh):
 
     def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
         """Room for all; `adopt` before the first change."""
-        model, layout = run.model.models[number], run.model.models[number].layout
-        assert layout is not None
+        model, layout = run.model.models[number], run.model.models[number].zoned
         self._switching, self._marked = switching, marks_on(layout.base, run.lines[number].marked)
         super().__init__(run, number, int(layout.starts[-1]), int((self._marked != 0).sum()))
         base, most = layout.rod.size, self.most
@@ -109,13 +108,13 @@ class CellChanges(Remesh):
 
     def _zones_on(self, k: int, cells: int) -> z.Zones:
         zones = self._switching.zones
-        kinds = self._view(self._kinds[k], cells, {"free": zones.kinds.free})
+        kinds = self._kinds[k].view(cells, free=zones.kinds.free)
         given = {"kinds": kinds, **{name: getattr(zones, name) for name in OF_BASE}}
-        found: z.Zones = self._view(self._zones[k], cells, given)
+        found: z.Zones = self._zones[k].view(cells, **given)
         return found
 
     def _layout(self, k: int, cells: int) -> Cells:
-        found: Cells = self._view(self._cells[k], cells)
+        found: Cells = self._cells[k].view(cells)
         return found
 
     # --- tables -------------------------------------------------------------------------------------
@@ -131,24 +130,24 @@ class CellChanges(Remesh):
 
     def _line_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
         to, model = 1 - k, self.model
-        assert model.on_base is not None
         at = self._layout(to, m)
         return {
-            "cable": model.on_base.cable, "nodes": at.s, "base_of_cell": at.of, "rod": at.rods, "line": self.line(to, m)
+            "cable": model.line_maker.cable, "nodes": at.s, "base_of_cell": at.of, "rod": at.rods,
+            "line": self.line(to, m),
         }  # fmt: skip
 
     def _kinds_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
         to, model = 1 - k, self.model
-        assert model.on_base is not None
         return {
-            "cable": model.on_base.cable, "base_of_cell": self._layout(to, m).of, "kinds": self._zones_on(to, m).kinds,
-            "floor_part": TENSION_FLOOR, "least": LEAST_TENSION * self._switching.manager.scale,
+            "cable": model.line_maker.cable, "base_of_cell": self._layout(to, m).of,
+            "kinds": self._zones_on(to, m).kinds, "floor_part": TENSION_FLOOR,
+            "least": LEAST_TENSION * self._switching.manager.scale,
         }  # fmt: skip
 
     def _switch_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         to, switching = 1 - k, self._switching
         at = self._layout(to, m)
-        match = self._view(self._match, m)._replace(single=self._view(self._match, n).single)
+        match = self._match.view(m)._replace(single=self._match.view(n).single)
         transfer = Transfer(
             self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m),
             self._layout(k, n).place, at.place, self._first[k], switching.kinks, self._clamps, self._held,
@@ -174,17 +173,15 @@ class CellChanges(Remesh):
         }  # fmt: skip
 
     def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
-        model = self.model
+        model, envelope = self.model, self._line.envelope
         extra = int((self._marked != 0).sum())
         self._along: dict[str, Any] = {
             "borne": 1.0 + model.cable.max_strain[self._piece],
             "widths": np.ascontiguousarray(model.cable.outer_diameter[self._piece]),
-            "start": np.zeros((self._finest.size, 3)), "envelope_s": np.zeros(1),
-            "bounds": np.zeros((4, b.EXTREMES, 1)), "stays": np.zeros(self.most + 1, np.int64),
+            "start": envelope.start, "envelope_s": envelope.s, "bounds": envelope.bounds,
+            "stays": np.zeros(self.most + 1, np.int64),
             "spare": np.zeros(4 * b.EXTREMES * (self.most + 1 + extra)),
         }  # fmt: skip
-        if (envelope := self._line.envelope) is not None:
-            self._along |= {"bounds": envelope.bounds, "envelope_s": envelope.s, "start": envelope.start}
         of_line = shaped(blank_line_job, self._line_job, *PAIRS)
         self._fill = of_line[2], of_line[0]  # by the side that the line is on
         tables = [
@@ -215,8 +212,7 @@ class CellChanges(Remesh):
 
     def _copy_beside(self, n: int) -> None:
         switching, model = self._switching, self.model
-        zones, at, layout = self._zones_on(0, n), self._layout(0, n), model.layout
-        assert layout is not None
+        zones, at, layout = self._zones_on(0, n), self._layout(0, n), model.zoned
         copy_fields(switching.zones, zones, (*OF_BASE, "kinds"))
         copy_fields(switching.zones.kinds, zones.kinds, ("free",))
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
@@ -224,8 +220,7 @@ class CellChanges(Remesh):
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
         model, zones = self.model, self._zones_on(self.side, self.cells)
-        assert model.layout is not None
-        layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy())
+        layout = model.zoned._replace(rod=zones.rod.copy(), here=zones.here.copy())
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         self._switching.set_model(model, zones)
         return model
@@ -262,11 +257,10 @@ class CellChanges(Remesh):
     def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
         """With nodes at places of the finest mesh that are kept, in the arrays that are not in use."""
         model, k, places = self.model, 1 - self.side, self._places[begin : begin + cells + 1]
-        assert model.layout is not None
         at, table = self._layout(k, cells), self._fill[k].table.numbers
         at.place[:], at.s[:] = places, self._finest[places]
         at.of[:] = np.searchsorted(self._starts, places[:-1], "right") - 1
-        at.rods[:] = model.layout.rod[at.of]
+        at.rods[:] = model.zoned.rod[at.of]
         table[:] = self._fill[k].of(0, cells)
         fill_line(table)
         return outputs_in(batch, self.line(k, cells), model.zones), begin + cells + 1

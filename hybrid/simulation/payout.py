@@ -320,10 +320,9 @@ class PayingOut:
 
     def as_now(self, model: Model) -> Model:
         """A model whose zones move, and whose nodes are where they are now."""
-        assert model.layout is not None
         self.lengthen()
         length = self.length
-        layout = self.plan.layout(self.count, length, model.layout.rod, model.layout.here)
+        layout = self.plan.layout(self.count, length, model.zoned.rod, model.zoned.here)
         on_base = LineOnBase(self.plan.held_as(model.cable), layout.base)
         return replace(model, layout=layout, on_base=on_base, zones=layout.zones, length=length)
 
@@ -344,9 +343,8 @@ class PayingOut:
 
     def fit(self, model: Model, t: float) -> None:
         """Let the line of a model whose zones have changed have the length of now, at t (s)."""
-        assert model.layout is not None
         if self.plan.follows:
-            self._set_cells(model.layout)
+            self._set_cells(model.zoned)
         self._fit(model.line, self.reel, float(self.reel.numbers.length), t)
 
     def _set_cells(self, layout: Layout) -> None:

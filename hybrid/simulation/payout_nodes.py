@@ -28,7 +28,6 @@ from hybrid.kernels.reel.node_changes import (
 from hybrid.kernels.reel.payout import stand_still
 from hybrid.kernels.reel.payout_nodes import CarryJob, carry_node
 from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
-from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import REMEMBERS
 from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
@@ -84,7 +83,7 @@ class NodeChanges(Remesh):
 
     def _reel(self, k: int, cells: int) -> Reel:
         now = self._paying.reel
-        found: Reel = self._view(self._reels[k], cells, {name: getattr(now, name) for name in SHARED})
+        found: Reel = self._reels[k].view(cells, **{name: getattr(now, name) for name in SHARED})
         return found
 
     def _beside_table(self) -> tuple[Table, Callable[[], Any]]:
@@ -114,11 +113,8 @@ class NodeChanges(Remesh):
     def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
         envelope, plan, most = self._line.envelope, self._paying.plan, self.most + 2
         way = slice(None, None, 1 if plan.side else -1)
-        start, bounds = np.zeros((plan.nodes.size, 3)), np.zeros((4, b.EXTREMES, 1))
-        if envelope is not None:
-            start, bounds = envelope.start, envelope.bounds
         borne = np.ascontiguousarray(1.0 + plan.cable.max_strain[way])
-        self._along = borne, np.ascontiguousarray(plan.cable.outer_diameter[way]), start, bounds
+        self._along = borne, np.ascontiguousarray(plan.cable.outer_diameter[way]), envelope.start, envelope.bounds
         self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
         nodes = shaped(blank_node_job, self._node_job, *PAIRS)
         # the table of `carry_node` begins that of the others

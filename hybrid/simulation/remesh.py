@@ -10,8 +10,7 @@ at a winch (simulation.payout_nodes).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
@@ -113,13 +112,12 @@ class OfRun(Protocol):
 class Around(NamedTuple):
     """What a run knows of a line beside its states.
 
-    envelope: extremes of all meshes, None: none are kept; marked: as of `marks_on`; nearest: (2,) the pair of cells
-    that was nearest.
+    envelope: extremes of all meshes; marked: as of `marks_on`; nearest: (2,) the pair of cells that was nearest.
     """
 
     work: Work
     books: Books
-    envelope: Envelope | None
+    envelope: Envelope
     marked: Sequence[tuple[float, int]]
     nearest: np.ndarray
 
@@ -155,16 +153,9 @@ REST_OF_SEA = tuple(name for name in Sea._fields if name not in OF_SEA)
 seas = Packed(no_sea, given=REST_OF_SEA)
 
 
-class Kept(NamedTuple):
-    """What of `Books` depends on the cells, but for the samples."""
-
-    tension: Floats
-    borne: Floats
-    strains: Floats
-    start: Floats
-    marks: np.ndarray
-    right: np.ndarray
-    extremes: Floats
+# Of `Books`, what does not depend on the cells, or is samples.
+OF_BOOKS = ("tension", "borne", "strains", "start", "marks", "right", "extremes")
+REST_OF_BOOKS = tuple(name for name in Books._fields if name not in OF_BOOKS)
 
 
 class Pushes(NamedTuple):
@@ -174,13 +165,10 @@ class Pushes(NamedTuple):
     next_push: Floats
 
 
-def blank_kept(n: int, extra: int, some: bool) -> Kept:
-    """Room for n cells; extra: marked nodes; some: whether extremes are kept."""
-    nodes, z = n + 1, np.zeros
-    return Kept(
-        z((2, n)), z(n), z((nodes if some else 0, b.STRAINS)), z((nodes, 3)), z(nodes, np.int8), z(nodes, np.int64),
-        z((4, b.EXTREMES, nodes + extra)) if some else z((4, 0, nodes)),
-    )  # fmt: skip
+def blank_kept(n: int, extra: int) -> Books:
+    """Books of n cells whose extremes are kept, with those of so many marked nodes."""
+    strains, extremes = np.zeros((n + 1, b.STRAINS)), np.zeros((4, b.EXTREMES, n + 1 + extra))
+    return b.blank_books(n)._replace(strains=strains, extremes=extremes)
 
 
 class Part(NamedTuple):
@@ -253,8 +241,7 @@ class Remesh:
         # of steps of the line by itself, and of those of all lines by their parity
         self._alone, self._even, self._odd = run.solver.tables_by_itself(number)
         self._limits, self.most, self._fixed_to = run.solver.limits_by_itself(number), most, self._key()
-        some = self._line.envelope is not None
-        kept, pushes = Packed(lambda n: blank_kept(n, marked, some)), Packed(blank_pushes)
+        kept, pushes = Packed(partial(blank_kept, extra=marked), given=REST_OF_BOOKS), Packed(blank_pushes)
         self._lines = Room(lines, most), Room(lines, most)
         self._states = tuple((Room(states, most), Room(states, most)) for _ in range(2))
         self._pushes, self._kept = (Room(pushes, most), Room(pushes, most)), (Room(kept, most), Room(kept, most))
@@ -266,8 +253,7 @@ class Remesh:
         self._calls, self._at, self._numbers = f.RemeshCalls(), f.RemeshPlaces(), np.zeros(f.NUMBERS)
         self._waiting = np.zeros((self.most_waiting, 3), np.int64)
         self._table = Table(f.blank_remesh_job)
-        self._views: dict[Any, Any] = {}  # while tables are bound
-        self.adopted, self._synced, self._bound, self._binding = False, -1, False, False
+        self._synced, self._bound = -1, False
 
     # --- what a planner says ------------------------------------------------------------------------
 
@@ -348,58 +334,36 @@ class Remesh:
 
     # --- arrays -------------------------------------------------------------------------------------
 
-    @contextmanager
-    def _binds(self) -> Iterator[None]:
-        """While tables are bound a view is the same for the same number of cells."""
-        self._binding = True
-        try:
-            yield
-        finally:
-            self._binding = False
-            self._views.clear()
-
-    def _view(self, room: Room, cells: int, given: Mapping[str, Any] | None = None) -> Any:
-        """Of a room, for so many cells; while tables are bound, the same for the same."""
-        if not self._binding:
-            return room.view(cells, **(given or {}))
-        if (room, cells) not in self._views:
-            self._views[room, cells] = room.view(cells, **(given or {}))
-        return self._views[room, cells]
-
     def line(self, k: int, cells: int) -> Line:
         """The line of side k."""
         line = self.model.line
-        found: Line = self._view(self._lines[k], cells, {"bits": line.bits, "plane": line.plane, **NO_LAWS})
+        found: Line = self._lines[k].view(cells, bits=line.bits, plane=line.plane, **NO_LAWS)
         return found
 
     def state(self, k: int, which: int, cells: int) -> State:
         """The state of side k of even (which = 0) or odd parity (1)."""
-        found: State = self._view(self._states[k][which], cells, NO_MEMORY)
+        found: State = self._states[k][which].view(cells, **NO_MEMORY)
         return found
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
         if not self.pushes[0].size:
             return NO_PUSH
-        found: Floats = self._view(self._pushes[k], cells)[which]
+        found: Floats = self._pushes[k].view(cells)[which]
         return found
 
     def _sea_on(self, cells: int) -> Sea:
         values = self.model.sea.values
-        found: Sea = self._view(self._sea, cells, {x: getattr(values, x) for x in REST_OF_SEA})
+        found: Sea = self._sea.view(cells, **{x: getattr(values, x) for x in REST_OF_SEA})
         return found
 
     def _work_on(self, cells: int) -> Work:
-        found: Work = self._view(self._work, cells, {"torsion": self._solver.work[self._number].torsion})
+        found: Work = self._work.view(cells, torsion=self._solver.work[self._number].torsion)
         return found
 
     def _books(self, k: int, cells: int) -> Books:
-        if not self._binding:
-            return self._line.books._replace(base=self._base, **self._kept[k].view(cells)._asdict())
-        if (Books, k, cells) not in self._views:
-            kept = self._view(self._kept[k], cells)._asdict()
-            self._views[Books, k, cells] = self._line.books._replace(base=self._base, **kept)
-        found: Books = self._views[Books, k, cells]
+        given = {name: getattr(self._line.books, name) for name in REST_OF_BOOKS} | {"base": self._base}
+        found: Books = self._kept[k].view(cells, **given)
         return found
 
     def _width(self, cells: int) -> Floats:
@@ -468,8 +432,7 @@ class Remesh:
         """Go on with the line of the run as it is now, in these arrays."""
         model, n, work = self.model, self.model.cells, self._solver.work[self._number]
         if not self._bound:
-            with self._binds():
-                self._bind_all()
+            self._bind_all()
             self._bound = True
         self._at.side, self._at.cells = 0, n
         counts, books, pushes = self._run.loop.counts, self._line.books, self.pushes
@@ -485,12 +448,12 @@ class Remesh:
         if self._watch_table is not None:
             itself = self._line.envelope.itself.itself
             copy_fields(itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
-        copy_fields(books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
+        copy_fields(books, self._books(0, n), REST_OF_BOOKS)
         self._copy_beside(n)
         self._alone.bind(task=Task(RUN, ca=HEAVY, limits=self._limits))
         self._calls.solver = self._solver.marcher_of(self._number)
         f.put_cells(self._table.numbers)
-        self.adopted, self._synced = True, -1
+        self._synced = -1
         counts.parity = parity
         self.sync()
 

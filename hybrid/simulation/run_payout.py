@@ -112,11 +112,10 @@ class PaidZones:
         """Before zones change at t (s): the model with its nodes where they are now."""
         self.hand_over(t, state)
         model, switching, zones = self.paying.as_now(model), self.switching, self.switching.zones
-        assert model.layout is not None and model.on_base is not None
         switching.model = model
         manager = self.manager
-        manager.layout, manager.on_base = model.layout, model.on_base
-        manager.measure(model.layout)
+        manager.layout, manager.on_base = model.zoned, model.line_maker
+        manager.measure(model.zoned)
         changing = self.paying.changing
         zones.lengths[changing] = model.line.h[changing]
         zones.true[changing] = model.line.h[changing]
@@ -141,19 +140,17 @@ class PaidZones:
     def resume(self, model: Model) -> None:
         """Go on with the cells of a checkpoint, from which all else follows (ZoneSwitching.restore)."""
         old = self.manager.layout
-        assert model.layout is not None
-        base, cells = np.arange(model.layout.rod.size), np.arange(model.cells)
+        base, cells = np.arange(model.zoned.rod.size), np.arange(model.cells)
         self._change_base(
             model, np.minimum(base, old.rod.size - 1), np.minimum(cells, old.base_of_cell.size - 1), anew=True
         )
 
     def _change_base(self, model: Model, source: np.ndarray, cells: np.ndarray, anew: bool = False) -> None:
-        assert model.layout is not None and model.on_base is not None
         paying, manager = self.paying, self.manager
         given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.ramp_time, paying.foreseen)
         given[[0, -1]] = np.where(self._turning, 1, given[[0, -1]])
         manager.cable = paying.plan.held_as(model.cable)
-        change_base(manager, model.layout, source, cells, given, model.on_base, anew)
+        change_base(manager, model.zoned, source, cells, given, model.line_maker, anew)
         self.switching.set_cells(model)
 
     def moving(self) -> MovingZones:

@@ -270,14 +270,12 @@ class RunZones(Part):
         run = self._run
         models, states = [*run.model.models], [*run.state.lines]
         for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
-            k, layout, manager = x.number, x.full.layout, x.switching.manager
-            assert layout is not None
+            k, layout, manager = x.number, x.full.zoned, x.switching.manager
             mine = matched(
                 saved["zones"][run.lines[k].name], {"rod": layout.rod, "here": None, "switching": None}, "zones"
             )
             model = on_layout(models[k], _saved_layout(layout, mine))
-            assert model.layout is not None
-            manager.set_layout(model.layout)
+            manager.set_layout(model.zoned)
             x.switching, x.pending = ZoneSwitching(model, manager), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
@@ -429,9 +427,8 @@ class RunZones(Part):
     @staticmethod
     def _use_full(x: _LineZones, model: Model) -> None:
         """Other loads, or other ends, of the line on the cells that it began with; those of one at a winch change."""
-        assert x.full.layout is not None
         if x.paid is None:
-            x.full = on_layout(model, x.full.layout)
+            x.full = on_layout(model, x.full.zoned)
 
     @property
     def changed(self) -> Collection[int]:
@@ -453,9 +450,8 @@ class LineKinds:
         self, model: Model, switching: ZoneSwitching, states: tuple[State, State], around: Around, ends: Ends
     ) -> None:
         """From now on the model has a line of its own, which changes; ends: conditions in the arrays of the run."""
-        assert model.layout is not None and model.on_base is not None
         self._switching, self._numbers, self._ends = switching, np.zeros(NUMBERS), ends
-        line, layout, sea, zones = copied(model.line), model.layout, model.sea.values, switching.zones
+        line, layout, sea, zones = copied(model.line), model.zoned, model.sea.values, switching.zones
         self.model = replace(model, line=line)
         own: dict[str, Any] = {name: getattr(line, name).copy() for name in OF_KINDS}
         self._before = line._replace(**own)
@@ -463,7 +459,7 @@ class LineKinds:
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._fill, self._switch, self._renew = Table(blank_line_job), Table(blank_switch_job), Table(blank_renew_job)
         self._fill.bind(
-            cable=model.on_base.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
+            cable=model.line_maker.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
         )
         (first, second), base = states, np.zeros(layout.rod.size)
         transfer = Transfer(
@@ -478,27 +474,24 @@ class LineKinds:
         )  # fmt: skip
         work, books, envelope, marked, nearest = around
         nodes, piece = line.s.size, model.cable.piece(0.5 * (line.s[1:] + line.s[:-1]))
-        bounds, places, start = np.zeros((4, b.EXTREMES, 1)), np.zeros(1), np.zeros((nodes, 3))
-        if envelope is not None:
-            bounds, places, start = envelope.bounds, envelope.s, envelope.start
         self._renew.bind(
             s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line, place=layout.places,
-            of=layout.base_of_cell, first=layout.first, start=start, marked=marks_on(line.s, marked),
+            of=layout.base_of_cell, first=layout.first, start=envelope.start, marked=marks_on(line.s, marked),
             borne=1.0 + model.cable.max_strain[piece], state=first, twin=second, sea=sea, work=work, zones=zones,
-            before=books, books=books, push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, envelope_s=places,
-            bounds=bounds, stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size), width=np.zeros(0),
+            before=books, books=books, push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, envelope_s=envelope.s,
+            bounds=envelope.bounds, stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size),
+            width=np.zeros(0),
             nearest=nearest, widths=base, scale=model.tension_scale,
         )  # fmt: skip
 
     def change(self, change: Change, t: float) -> float:
         """Other kinds of cells from t (s) on: nothing moves; the energy, J, that is to be booked."""
         switching, model, numbers = self._switching, self.model, self._numbers
-        assert model.layout is not None
         for name in OF_KINDS:
             getattr(self._before, name)[:] = getattr(model.line, name)
         self._keeps[:] = switching.zones.keeps
-        layout = model.layout._replace(rod=change.rod.copy())
-        self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.layout.base_of_cell]
+        layout = model.zoned._replace(rod=change.rod.copy())
+        self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.zoned.base_of_cell]
         self._clamps[:], self._held[:] = switching.clamps(self._ends)
         numbers[TIME], numbers[RELAXES] = t, switching.zones.counts.relaxing
         fill_line(self._fill.numbers)

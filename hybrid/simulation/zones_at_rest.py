@@ -60,9 +60,7 @@ def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping
         except ComputationError:
             pass
     for k, manager in managers.items():
-        layout = model.models[k].layout
-        assert layout is not None
-        manager.set_layout(layout)
+        manager.set_layout(model.models[k].zoned)
     return _with_catenaries(model, equilibrium_of(system, model, t), managers, t)
 
 
@@ -83,8 +81,7 @@ def _on_planned_cells(model: NetworkModel, found: LinesAtRest, managers: Mapping
         others, states = dict[int, Model](), [*found.state.lines]
         for k, here in before.items():
             old = model.models[k]
-            assert old.layout is not None
-            others[k] = on_layout(old, old.layout._replace(here=here))
+            others[k] = on_layout(old, old.zoned._replace(here=here))
             states[k] = refined(states[k], old.line, others[k].line)
         model = _with(model, others)
         start = NetworkState(states, found.state.bodies)
@@ -101,7 +98,7 @@ def _with_catenaries(model: NetworkModel, found: LinesAtRest, managers: Mapping[
     most = _most_rod(model, found, managers, t)
     for k, manager in managers.items():
         if not (manager.given >= 0).all():
-            _use_rods(manager, most[0].models[k])
+            manager.set_layout(most[0].models[k].zoned)
     return most
 
 
@@ -148,7 +145,7 @@ def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[in
     try:
         for part in STRICTER:
             for k, manager in managers.items():
-                _use_rods(manager, model.models[k])
+                manager.set_layout(model.models[k].zoned)
                 manager.tolerance = part * allowed[k]
             answer = _within(model, found, managers, t)
             if answer is None:
@@ -161,7 +158,7 @@ def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[in
     for k, manager in managers.items():
         manager.held |= held
         manager.tolerance = allowed[k] if held else manager.tolerance
-        _use_rods(manager, most.models[k])
+        manager.set_layout(most.models[k].zoned)
     return most, rest
 
 
@@ -177,8 +174,7 @@ def _with_rods(model: NetworkModel, found: LinesAtRest, rods: Mapping[int, np.nd
     models, states = [*model.models], [*found.state.lines]
     for k, rod in rods.items():
         full = model.models[k]
-        assert full.layout is not None
-        models[k] = on_layout(full, full.layout._replace(rod=rod))
+        models[k] = on_layout(full, full.zoned._replace(rod=rod))
         states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at_time(t))
     other, start = replace(model, models=tuple(models)), NetworkState(states, found.state.bodies)
     return other, solve_from(found, other, t, found.bodies, start, "the equilibrium of rods")
@@ -194,11 +190,6 @@ def zones_as_placed(
     return replace(model, models=tuple(models)), managers
 
 
-def _use_rods(manager: DomainManager, model: Model) -> None:
-    assert model.layout is not None
-    manager.set_layout(model.layout)
-
-
 def _within(
     model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float
 ) -> tuple[NetworkModel, LinesAtRest] | None:
@@ -209,7 +200,7 @@ def _within(
             return None
         other, answer = _with_rods(model, found, rods, t)
         for k, manager in managers.items():
-            _use_rods(manager, other.models[k])
+            manager.set_layout(other.models[k].zoned)
         more = {k: rods[k] | asked for k, asked in _asked(managers, other, answer, t).items()}
         if all((more[k] == rods[k]).all() for k in managers):
             return other, answer

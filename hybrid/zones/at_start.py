@@ -66,23 +66,21 @@ def reasons_at_start(manager: DomainManager | None) -> str:
 
 def with_fewer_cells(model: Model) -> Model:
     """All rod, with every fourth node of the finest mesh where that has many cells: its equilibrium is found sooner."""
-    assert model.layout is not None
-    here, ends = np.zeros(model.layout.starts[-1] + 1, bool), model.ends.values
+    here, ends = np.zeros(model.zoned.starts[-1] + 1, bool), model.ends.values
     here[:: FEWER if model.cells > MANY else 1] = True
-    new = on_layout(model, model.layout._replace(here=here))
+    new = on_layout(model, model.zoned._replace(here=here))
     others = tuple((name, on_fewer(x, model.line, new.line, ends)) for name, x in model.other_starts)
     return replace(new, start=on_fewer(model.start, model.line, new.line, ends), other_starts=others)
 
 
 def planned_cells(model: Model, manager: DomainManager, state: State, t: float) -> np.ndarray:
     """Places of the finest mesh where a state at rest under the loads of t wants nodes, of rods as they are."""
-    assert model.layout is not None
     sea, ends = model.sea.at_time(t), model.ends.at_time(t)
-    manager.set_layout(model.layout)
+    manager.set_layout(model.zoned)
     manager.evaluate_criteria(model.line, sea, ends, state, 0.0)
     switching = ZoneSwitching(model, manager)
     for _ in range(IDLE_STEPS):  # for which cells must have been too short
-        here = switching.plan(model.layout.rod, sea, ends, state)
+        here = switching.plan(model.zoned.rod, sea, ends, state)
     manager.reset()
     manager.zones.idle_steps[:] = 0
     assert here is not None
@@ -94,7 +92,7 @@ def manager_for(
 ) -> DomainManager:
     """The domain manager of a model that is rod wherever it may be."""
     wanted = scene.model
-    assert isinstance(wanted, AdaptiveModel) and model.layout is not None
+    assert isinstance(wanted, AdaptiveModel)
     step = resolution.step if resolution.local is None else 0.0
     shortest = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
     period = longest_period(scene)
@@ -110,10 +108,10 @@ def manager_for(
     times = Times(hold, ramp, foreseen, period if curvature_error is None else 0.0)
     given = _given(scene, model, ramp)
     manager = DomainManager.on_layout(
-        model.cable, model.layout, given, model.tension_scale, allowed, times, criterion, model.on_base
+        model.cable, model.zoned, given, model.tension_scale, allowed, times, criterion, model.on_base
     )
     manager.load(model.ends.moments)
-    base = model.layout.base
+    base = model.zoned.base
     for a, b, lack in resolution.rods:
         there = (base[:-1] < b) & (base[1:] > a)
         manager.foreseen[there] = np.maximum(manager.foreseen[there], lack)
@@ -125,8 +123,7 @@ def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, 
 
     count: material nodes that are out; ramp: s, ramp time of bending stiffness; rate: m/s.
     """
-    assert model.layout is not None
-    given = given_zones(scene, model.layout)
+    given = given_zones(scene, model.zoned)
     near = plan.at_winch(count, AHEAD * ramp * abs(rate))
     given[near & (given == 0)] = 1
     return given
@@ -134,21 +131,19 @@ def rods_at_winch(scene: LineScene, plan: PayoutPlan, model: Model, count: int, 
 
 def _given(scene: LineScene, model: Model, ramp: float) -> np.ndarray:
     """(n,) of base cells: 1 rod, -1 catenary, 0 adaptive; ramp: s, ramp time of bending stiffness."""
-    assert model.layout is not None
     if model.payout is None:
-        return given_zones(scene, model.layout)
+        return given_zones(scene, model.zoned)
     paid = model.payout
     return rods_at_winch(scene, paid, model, paid.count(paid.first), ramp, fastest(paid.law))
 
 
 def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:
     """A start that is no equilibrium is rod, but for what the scene wants to be catenary."""
-    assert model.layout is not None
     free = manager.given >= 0
     if free.all():
         return model
-    new = on_layout(model, model.layout._replace(rod=free))
-    manager.set_layout(model.layout._replace(rod=free))
+    new = on_layout(model, model.zoned._replace(rod=free))
+    manager.set_layout(model.zoned._replace(rod=free))
     return replace(new, start=on_fewer(model.start, model.line, new.line, model.ends.values))
 
 

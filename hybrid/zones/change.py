@@ -38,8 +38,7 @@ MOST_RESCUES = 20
 
 def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
-    assert model.on_base is not None
-    line = model.on_base.line(layout, model.line.bits, model.line.plane, model.line.moved)
+    line = model.line_maker.line(layout, model.line.bits, model.line.plane, model.line.moved)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
@@ -96,18 +95,16 @@ class ZoneSwitching:
 
     def set_cells(self, model: Model) -> None:
         """Go on with a model whose line has all of its stiffness and its true lengths: cells have come or gone."""
-        assert model.layout is not None
         self.model = model
-        self.kinks = np.zeros(model.layout.base.size, bool)
-        self.kinks[model.cable.point_nodes(model.layout.base)] = True
+        self.kinks = np.zeros(model.zoned.base.size, bool)
+        self.kinks[model.cable.point_nodes(model.zoned.base)] = True
         self._set_line(model.line, model.line.h)
         self.zones.true[:] = np.diff(model.line.s)
 
     def set_model(self, model: Model, zones: Zones) -> None:
         """Go on with a model of the same zones in other cells, which have been changed to."""
-        assert model.layout is not None
         self.model = model
-        self.manager.use_cells_of(model.layout, zones)
+        self.manager.use_cells_of(model.zoned, zones)
 
     def _set_line(self, line: Line, lengths: Floats) -> None:
         """A line with all of its stiffness and its true lengths; lengths: (N,) m, that its cells have now."""

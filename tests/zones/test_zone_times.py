@@ -163,7 +163,7 @@ def test_rounds_of_zones_and_equilibrium_only_add_rod_and_end(monkeypatch: pytes
         return model, rest
 
     monkeypatch.setattr(zones_at_rest, "_with_rods", with_rods)
-    monkeypatch.setattr(zones_at_rest, "_use_rods", lambda *_: None)
+    monkeypatch.setattr(found, "set_layout", lambda _: None)
     monkeypatch.setattr(zones_at_rest, "_asked", lambda *_: {0: np.arange(20) == len(made)})
     model = SimpleNamespace(models=[built])
     assert zones_at_rest._within(model, None, {0: found}, 0.0) is None  # type: ignore[arg-type]
