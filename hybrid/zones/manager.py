@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -20,13 +19,13 @@ from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_lengths import FADE
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION, shares
-from hybrid.kernels.mesh.zone_plan import OFF, ROUND_TIME, reach, widen
+from hybrid.kernels.mesh.zone_plan import OFF, blank_review_job, reach, review_zones, widen
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.material import Material, tension_floor
 from hybrid.model.mesh import Layout, LineOnBase, edges
 from hybrid.zones.criteria import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
-from hybrid.zones.plan import Allowed, Change, Reason, Rules, Times, planned, spread, tidied, wanted
+from hybrid.zones.plan import Allowed, Change, Reason, Times, spread, tidied, wanted
 
 # Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension
 # it is weight that straightens a cable.
@@ -127,8 +126,8 @@ class DomainManager:
         self.below_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.release_cause = np.zeros((2, n))  # of rods on their way out: criterion, and its ratio
         self.wait_factor, self.released = np.ones(n), np.full(n, -np.inf)
-        self._review_room = np.zeros(0), np.zeros(0), np.zeros((4, 0), bool)  # what compiled reviews write
-        self._table = Table(blank_zone_job)
+        self._review_room = np.zeros(0), np.zeros(0), np.zeros((4, 0), bool)  # what reviews write
+        self._table, self._review = Table(blank_zone_job), Table(blank_review_job)
 
     @classmethod
     def on_layout(
@@ -321,34 +320,18 @@ class DomainManager:
     def review(self, t: float, state: State) -> Change | None:
         """The change that follows from the ratios since the last review; None: no change."""
         rod = self.layout.rod
-        self._add_global_ratios()
-        rules = self.rules(state)
-        next_, self.below_since[:] = planned(
-            self.ratios, rod, self.below_since, t, self.layout.base, rules, self.leaving, self.wait_factor
-        )
-        next_ = (next_ | (rod & self.held)) & (self.given >= 0)
-        back, before = self.going, self.leaving.copy()
-        self.leaving[:] = rod & ~next_
-        self.going = bool(self.leaving.any())
-        if back or self.going:
-            self._update_ramping()  # perhaps one that was on its way out
-            now = self.leaving & ~before
-            self.release_cause[0, now] = leading = np.argmax(self.ratios[:, now] / OFF[:, None], axis=0)
-            self.release_cause[1, now] = np.take_along_axis(self.ratios[:, now], leading[None], axis=0)[0]
-        wait, new = 1.0 / REVIEWS, next_
-        if self.going:
-            wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
-            new = next_ | (self.leaving & (self.grown > 0.0))
-        self.next_review = t + (wait - ROUND_TIME) * self.ramp_time
-        change = None
+        self._table.bind(old=state, zones=self.zones)
+        self.bind_review(self._review, self._table.numbers)
+        review_zones(self._review.numbers, float(t))
+        new, change = self._review_room[2][3] | (self.leaving & (self.grown > 0.0)), None
         if (new != rod).any():
-            urgent = spread((self.ratios[SLACK] > 1.0) | self._losing_tension(state), self.layout.base, rules.buffer)
+            urgent = spread((self.ratios[SLACK] > 1.0) | self._losing_tension(state), self.layout.base, self.buffer)
             change = Change(new, tuple(self._reasons(rod, new)), urgent, np.zeros_like(rod))
         self._reset_ratios()
         return change
 
     def bind_review(self, table: Table, zone_table: NDArray[np.int64]) -> None:
-        """Bind what compiled reviews of zones (quiet_review) know; zone_table: of their ZoneJob."""
+        """Bind what reviews of zones (kernels.mesh.zone_plan) know; zone_table: of their ZoneJob."""
         n = self.given.size
         if self._review_room[0].size != n:
             self._review_room = np.zeros(n), np.zeros(n), np.zeros((4, n), bool)
@@ -364,14 +347,15 @@ class DomainManager:
 
     def initial_rods(self, state: State) -> np.ndarray:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
-        n = self.layout.rod.size
-        self._add_global_ratios()
+        self.ratios[GIVEN, self.given > 0] = FORCED_RATIO
+        if self.twisted or self.zones.counts.loaded:  # torque needs rods from end to end
+            self.ratios[TORSION] = self.ratios[TORSION].max()
         np.maximum(self.ratios[BEND], self.foreseen, out=self.ratios[BEND])
         np.maximum(self.first, self.ratios, out=self.first)
-        rules = self.rules(state)
-        asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)
+        asks = wanted(self.ratios, np.zeros_like(self.layout.rod))
+        asks = spread(asks, self.layout.base, self.buffers(state))
         self._reset_ratios()
-        return np.asarray(tidied(asks, asks, rules.shortest) & (self.given >= 0))
+        return np.asarray(tidied(asks, asks, SHORTEST) & (self.given >= 0))
 
     def joint_passed(self, change: Change) -> float | None:
         """Place, m, of the first joint that a rod grows past by a change; None: no rod does."""
@@ -406,24 +390,13 @@ class DomainManager:
         # not by `layout`, which cells that follow leave behind between two reviews
         return np.asarray(np.bincount(self.zones.kinds.base_of_cell, falls, self.layout.rod.size) > 0.0)
 
-    @cached_property
-    def _asks_layers(self) -> bool:
-        """As mesh.zone_step has it, by what is asked, which stays: a call with all of zones takes half of a review."""
-        return bool(z.asks_layers(self.zones))
-
-    def rules(self, state: State) -> Rules:
-        """The rules at the tensions of a state."""
+    def buffers(self, state: State) -> Floats:
+        """Rod (n,) m on either side of what asks for it, at the tensions of a state."""
         of, least = self.zones.kinds.base_of_cell, 1e-9 * self.scale
         reach(state.T, of, self.EI, self.w, self.floor, BUFFER, least, self.buffer)
-        if self._asks_layers:
+        if z.asks_layers(self.zones):
             widen(self.buffer, self.zones.H)
-        return Rules(self.buffer, SHORTEST, self.dwell)
-
-    def _add_global_ratios(self) -> None:
-        """Ratios that are not local: forced rods, and torque, which needs rods from end to end."""
-        self.ratios[GIVEN, self.given > 0] = FORCED_RATIO
-        if self.twisted or self.zones.counts.loaded:
-            self.ratios[TORSION] = self.ratios[TORSION].max()
+        return self.buffer
 
     def _reset_ratios(self) -> None:
         np.maximum(self.seen, self.ratios, out=self.seen)

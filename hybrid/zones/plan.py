@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.mesh.zone_plan import OFF, make_plan, mark_spread, mark_wanted, tidy
+from hybrid.kernels.mesh.zone_plan import OFF, mark_spread, mark_wanted, tidy
 from hybrid.kernels.state.state import Floats
 
 
@@ -64,18 +64,6 @@ class Change(NamedTuple):
     same: bool = False  # whether cells change and nothing else
 
 
-class Rules(NamedTuple):
-    """How zones are made of what is asked.
-
-    buffer: (n,) m, rod on either side of what asks for it; shortest: least cells of a zone; dwell: s, how long a rod
-    must have been below its thresholds before it goes.
-    """
-
-    buffer: Floats
-    shortest: int
-    dwell: float
-
-
 def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
     """Base cells (n,) that ask to be, or to stay, a rod: hysteresis between 1 and the criterion's `off`."""
     out = np.empty(rod.size, bool)
@@ -95,29 +83,3 @@ def tidied(flags: np.ndarray, rod: np.ndarray, shortest: int) -> np.ndarray:
     out = flags.copy()
     tidy(out, rod, shortest, np.empty_like(out))
     return out
-
-
-def planned(
-    ratios: Floats,
-    rod: np.ndarray,
-    below_since: Floats,
-    t: float,
-    base: Floats,
-    rules: Rules,
-    leaving: np.ndarray | None = None,
-    wait_factor: Floats | None = None,
-) -> tuple[np.ndarray, Floats]:
-    """What the base cells should be, and since when (s) each rod is below its thresholds (infinity: it is not).
-
-    rod: (n,) what they are; below_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
-    whose curvature rises for that reason alone: they are kept only above BACK; wait_factor: (n,) dwell times that each
-    cell must be below them, 1 if not given.
-    """
-    n = rod.size
-    below = below_since.copy()
-    flags = np.zeros((4, n), bool)
-    if leaving is not None:
-        flags[0] = leaving
-    wait = np.full(n, float(rules.dwell)) if wait_factor is None else rules.dwell * wait_factor
-    make_plan(ratios, OFF, rod, below, float(t), base, rules.buffer, rules.shortest, wait, flags)
-    return flags[3], below

@@ -14,6 +14,7 @@ import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.zone_plan import OFF, make_plan
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
 from hybrid.kernels.mesh.zone_transfer import transfer
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
@@ -268,3 +269,19 @@ def bight() -> dict:
         time=(80.0, 0.1),
         output=(1.0, 401),
     )
+
+
+class Rules(NamedTuple):
+    """How zones are made of what is asked: (n,) m of rod on either side of it, least cells of a zone, and s of dwell."""
+
+    buffer: Floats
+    shortest: int
+    dwell: float
+
+
+def planned(ratios, rod, below_since, t, base, rules, leaving=False):
+    """What base cells (n,) should be, and since when (s) each rod is below its thresholds; leaving: all are blended out."""
+    below, flags = below_since.copy(), np.zeros((4, rod.size), bool)
+    flags[0], wait = leaving, np.full(rod.size, rules.dwell)
+    make_plan(ratios, OFF, rod, below, float(t), base, rules.buffer, rules.shortest, wait, flags)
+    return flags[3], below

@@ -9,14 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from adapt_cases import cable, layout, on
+from adapt_cases import Rules, cable, layout, on, planned
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.zone_plan import OFF, widen
 from hybrid.model.mesh import edges
-from hybrid.zones.plan import Rules, planned, spread, wanted
+from hybrid.zones.plan import spread, wanted
 
 K = len(CRITERIA)
 ALL = range(K)

@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from adapt_cases import along, cable, even, on, state_on, still
+from adapt_cases import Rules, along, cable, even, on, planned, state_on
 from problems import pinned, scene
 
 from hybrid.kernels.junctions.joined_lines import TURNS
-from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
-from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
-from hybrid.kernels.state.state import no_sea
 from hybrid.model.build import build
 from hybrid.model.mesh import Layout
 from hybrid.model.resolution import first_resolution
@@ -24,7 +21,7 @@ from hybrid.scene.analysis import AdaptiveModel
 from hybrid.scene.read import one_line
 from hybrid.simulation.zones_at_rest import managers_for
 from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Change, Rules, Times, planned
+from hybrid.zones.plan import Allowed, Change, Times
 
 HOLD = 2.0  # s
 
@@ -136,18 +133,18 @@ def test_rods_are_two_lengths_of_bending_wider_than_what_asks() -> None:
     """Twice sqrt(EI/T), or (EI/w)^(1/3) where that is shorter; two cells where results must show a bend at a joint."""
     found = manager("CCCCCCCCCC")
     line = on(found.cable, found.layout)
-    assert found.rules(state_on(line, along(), tension=50.0)).buffer == pytest.approx(2.0 * np.sqrt(2.0 / 50.0))
-    assert found.rules(state_on(line, along(), tension=2.0)).buffer == pytest.approx(2.0 * (2.0 / 10.0) ** (1.0 / 3.0))
+    assert found.buffers(state_on(line, along(), tension=50.0)) == pytest.approx(2.0 * np.sqrt(2.0 / 50.0))
+    assert found.buffers(state_on(line, along(), tension=2.0)) == pytest.approx(2.0 * (2.0 / 10.0) ** (1.0 / 3.0))
     allowed = Allowed(0.01, asked={CURVATURE: 0.05})
     found = DomainManager.on_layout(cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, allowed, Times(HOLD))
-    assert (found.rules(state_on(line, along(), tension=50.0)).buffer >= 1.0).all()
+    assert (found.buffers(state_on(line, along(), tension=50.0)) >= 1.0).all()
 
 
 def test_a_rod_on_its_way_out_comes_back_above_half_of_what_makes_a_rod() -> None:
     ratios, rod = np.zeros((len(CRITERIA), 10)), np.ones(10, bool)
     ratios[BEND] = np.where(np.arange(10) < 5, 0.55, 0.45)
     rules = Rules(np.zeros(10), 2, HOLD)
-    stays, _ = planned(ratios, rod, np.full(10, -100.0), 0.0, np.arange(11.0), rules, leaving=rod)
+    stays, _ = planned(ratios, rod, np.full(10, -100.0), 0.0, np.arange(11.0), rules, leaving=True)
     assert stays.tolist() == [True] * 5 + [False] * 5
 
 
@@ -209,10 +206,23 @@ def test_rods_go_when_they_have_no_stiffness_left_and_the_next_review_is_when_on
 
 
 def test_without_anything_to_do_there_are_four_reviews_in_a_ramp_time() -> None:
-    """A little earlier, lest round-off puts one off by a step; compiled ones likewise."""
-    for compiled in (False, True):
-        found = reviewed("C" * 10, np.zeros((len(CRITERIA), 10)), False, 1.0, compiled)
-        assert 0.25 * HOLD * (1.0 - 1e-6) < found.next_review < 0.25 * HOLD
+    """A little earlier, lest round-off puts one off by a step."""
+    found = manager("C" * 10)
+    assert review_of(found) is None
+    assert 0.25 * HOLD * (1.0 - 1e-6) < found.next_review < 0.25 * HOLD
+
+
+@pytest.mark.parametrize("wait", [1.0, 8.0])
+@pytest.mark.parametrize("twisted", [True, False])
+def test_rods_go_that_were_calm_for_long_enough_and_with_a_torque_none_is(twisted: bool, wait: float) -> None:
+    """Rods at both ends and in the middle, of which some are loud; all were calm for 5 s, and are to be for 2 or 16."""
+    found = manager("RRCCRRCCRR")
+    found.below_since[:], found.wait_factor[:], found.twisted = -5.0, wait, twisted
+    found.ratios[BEND, 1] = found.ratios[TORSION, 4] = 0.95
+    assert review_of(found) is None and not found.ratios.any() and found.seen[BEND, 1] == 0.95
+    assert np.isinf(found.below_since[8:]).all() == twisted
+    assert found.leaving[8:].all() == found.going == (not twisted and wait == 1.0)
+    assert not found.leaving[:2].any()
 
 
 def test_rods_are_urgent_where_a_line_is_slack_and_not_where_it_bends() -> None:
@@ -237,44 +247,3 @@ def test_rods_are_urgent_where_a_line_without_weight_loses_tension(
     found.ratios[BEND, 7] = 1.5
     change = review_of(found, tension=50.0)
     assert change is not None and change.urgent[7] == urgent
-
-
-# --- compiled reviews ---------------------------------------------------------------------------------
-
-
-def reviewed(rod: str, ratios: Any, twisted: bool, wait: float, compiled: bool) -> DomainManager:
-    """After a review at t = 0 of ratios (criteria, n) below 1, by the compiled run or by Python.
-
-    All were calm for 5 s, and are to be so for `wait` holds.
-    """
-    found = manager(rod)
-    found.below_since[:], found.wait_factor[:] = -5.0, wait
-    line = on(found.cable, found.layout)
-    state, sea = state_on(line, along(), tension=1e6), no_sea(line.h.size)
-    found.evaluate_criteria(line, sea, still(), state, 0.0)
-    found.twisted = twisted
-    found.highest_ratio = 0.0
-    found.ratios[:] = ratios
-    if compiled:
-        table = Table(blank_review_job)
-        found._table.bind(old=state, new=state, zones=found.zones)
-        found.bind_review(table, found._table.numbers)
-        assert quiet_review(table.numbers) == 1
-    else:
-        assert found.review(0.0, state) is None
-    return found
-
-
-@pytest.mark.parametrize("wait", [1.0, 8.0])
-@pytest.mark.parametrize("twisted", [True, False])
-def test_a_compiled_review_decides_as_one_in_python(twisted: bool, wait: float) -> None:
-    """Rods at both ends and in the middle, of which some are loud; with a torque none is calm, however far it is."""
-    ratios = np.random.default_rng(1).uniform(0.0, 0.05, (len(CRITERIA), 10))
-    ratios[BEND, 1], ratios[TORSION] = 0.95, 0.0
-    ratios[TORSION, 4] = 0.95
-    both = [reviewed("RRCCRRCCRR", ratios, twisted, wait, compiled) for compiled in (True, False)]
-    for name in ("below_since", "leaving", "release_cause", "next_review", "seen", "going"):
-        one, other = (np.asarray(getattr(x, name), float) for x in both)
-        np.testing.assert_allclose(one, other, rtol=1e-12, err_msg=name)
-    assert np.isinf(both[0].below_since[8:]).all() == twisted
-    assert both[0].leaving[8:].all() == (not twisted and wait == 1.0)

@@ -156,7 +156,7 @@ def make_plan(ratios, off, rod, below_since, t, base, buffer, shortest, wait, fl
     tidy(out, rod, shortest, asks)
 
 
-# --- reviews without consequence --------------------------------------------------------------------
+# --- reviews --------------------------------------------------------------------------------------
 
 
 class ReviewJob(NamedTuple):
@@ -199,44 +199,16 @@ def leading_criterion(ratios, off, j):
 
 
 @inner
-def stays(job, zones, j):
-    """Whether base cell j remains what it is: no catenary becomes rod, and no rod without stiffness goes."""
-    planned = (job.flags[3, j] or (job.held != 0 and zones.rod[j])) and job.given[j] >= 0
-    return zones.rod[j] if planned else not zones.rod[j] or zones.grown[j] > 0.0
-
-
-@inner
-def let_go(job, zones):
-    """Rods that are not planned are on their way out; the part of the ramp time until one of them may have gone."""
-    ratios, wait, going, any_before = zones.ratios, job.pause, 0, zones.counts.going
-    for j in range(zones.rod.shape[0]):
-        planned = (job.flags[3, j] or job.held != 0) and job.given[j] >= 0
-        goes = zones.rod[j] and not planned
-        if goes:
-            going, wait = 1, min(wait, zones.grown[j])
-            if not zones.leaving[j]:
-                c = leading_criterion(ratios, job.off, j)
-                job.release_cause[0, j], job.release_cause[1, j] = c, ratios[c, j]
-        zones.leaving[j] = goes
-    zones.counts.going = going
-    if going or any_before:
-        zones.counts.coming = z.is_coming(zones)  # perhaps one that was on its way out
-    return wait
-
-
-@kernel
-def quiet_review(table):
-    """1 where a review now leaves all zones as they are, and is done; 0: the domain manager has to do it."""
-    job = read(table)
-    run = read_zones(job.zone_table)
-    zones, clock = run.zones, run.zones.clock
-    kinds, ratios, n = zones.kinds, zones.ratios, zones.rod.shape[0]
-    if clock.highest_ratio > 1.0:
-        return 0
+def plan_zones(job, run, now):
+    """What base cells should be, into flags[3], and since when rods are below their thresholds, into `next_below`."""
+    zones, kinds, ratios = run.zones, run.zones.kinds, run.zones.ratios
+    n = zones.rod.shape[0]
     if zones.counts.holds_twist or zones.counts.loaded:  # torque needs rods from end to end
-        most = 0.0
-        for j in range(n):
-            most = max(most, ratios[TORSION, j])
+        most = ratios[TORSION, 0]
+        for j in range(1, n):
+            x = ratios[TORSION, j]
+            if x > most or math.isnan(x):
+                most = x
         for j in range(n):
             ratios[TORSION, j] = most
     for j in range(n):
@@ -248,15 +220,60 @@ def quiet_review(table):
     reach(state.T, kinds.base_of_cell, kinds.EI, kinds.w, kinds.floor, job.parts, job.light, job.buffer)
     if z.asks_layers(zones):
         widen(job.buffer, zones.H)
-    now = run.clock.now
     make_plan(ratios, job.off, zones.rod, job.next_below, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
     for j in range(n):
+        job.flags[3, j] = (job.flags[3, j] or (job.held != 0 and zones.rod[j])) and job.given[j] >= 0
+
+
+@inner
+def stays(job, zones, j):
+    """Whether base cell j remains what it is: no catenary becomes rod, and no rod without stiffness goes."""
+    return zones.rod[j] if job.flags[3, j] else not zones.rod[j] or zones.grown[j] > 0.0
+
+
+@inner
+def let_go(job, zones, now):
+    """Rods that are not planned are on their way out; the next review is when one of them may have gone."""
+    ratios, wait, going, any_before = zones.ratios, job.pause, 0, zones.counts.going
+    for j in range(zones.rod.shape[0]):
+        job.below_since[j] = job.next_below[j]
+        goes = zones.rod[j] and not job.flags[3, j]
+        if goes:
+            going, wait = 1, min(wait, zones.grown[j])
+            if not zones.leaving[j]:
+                c = leading_criterion(ratios, job.off, j)
+                job.release_cause[0, j], job.release_cause[1, j] = c, ratios[c, j]
+        zones.leaving[j] = goes
+    zones.counts.going = going
+    if going or any_before:
+        zones.counts.coming = z.is_coming(zones)  # perhaps one that was on its way out
+    zones.clock.next_review = now + (max(wait, 0.0) - ROUND_TIME) * job.ramp_time
+
+
+@kernel
+def review_zones(table, now):
+    """Plan zones at a time, s, and let rods go that are not planned; the domain manager carries the plan out."""
+    job = read(table)
+    run = read_zones(job.zone_table)
+    plan_zones(job, run, now)
+    let_go(job, run.zones, now)
+
+
+@kernel
+def quiet_review(table):
+    """1 where a review now leaves all zones as they are, and is done; 0: the domain manager has to do it."""
+    job = read(table)
+    run = read_zones(job.zone_table)
+    zones, now = run.zones, run.clock.now
+    ratios = zones.ratios
+    if zones.clock.highest_ratio > 1.0:
+        return 0
+    plan_zones(job, run, now)
+    for j in range(zones.rod.shape[0]):
         if not stays(job, zones, j):
             return 0
-    wait = let_go(job, zones)
-    for j in range(n):
-        job.below_since[j] = job.next_below[j]
+    let_go(job, zones, now)
+    for j in range(zones.rod.shape[0]):
         for c in range(ratios.shape[0]):
             job.seen[c, j], ratios[c, j] = max(job.seen[c, j], ratios[c, j]), 0.0
-    clock.next_review = now + (max(wait, 0.0) - ROUND_TIME) * job.ramp_time
     return 1
