@@ -31,7 +31,6 @@ from hybrid.scene.ends import SOURCES
 from hybrid.scene.schema import LineScene
 from hybrid.store.integrity import matched
 
-ROUND_OFF = 1e-9  # of a length
 # Arrays of a line that its length changes, and that outputs ask for.
 VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
 VARIES_TOO = ("bend_law", "tension_twist", "wake_law")  # likewise, of lines that have them
@@ -202,12 +201,8 @@ class PayingOut:
     def lengthening(self) -> Floats:
         """(N,) m/s2, second rates of the lengths of cells."""
         out = np.zeros(self.reel.true.size)
-        out[self.material - 1] = self.reel.numbers.acceleration
-        return self._ordered(out)
-
-    def _ordered(self, x: Floats) -> Floats:
-        """Values of cells, given from the far end on, in the order of the line; and back."""
-        return x if self.plan.side else x[::-1]
+        out[self.material - 1] = self.reel.numbers.acceleration  # from the far end on
+        return out if self.plan.side else out[::-1]
 
     def leave_unbalanced(self) -> None:
         """Nothing balances the neighbours of a node that has just entered or left."""
@@ -485,18 +480,13 @@ class PayingOut:
     def advance(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
         """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.
 
+        asked: its length, m, and rate, m/s, at the end; no length: the one to which an even change of the rate leads.
         ValueError: it cannot be so long, or so short.
         """
-        if self.plan.from_outside and not (self.ended or self.stopped):
-            length, rate = asked or (None, length_at.py_func(self.law, begin)[1])
-            self.drive(begin, end, length, rate)
-
-    def drive(self, begin: float, end: float, length: float | None, rate: float) -> None:
-        """From `begin` to `end`, s, the length goes to `length`, m, with that rate there, m/s, which it keeps.
-
-        length: None: the one to which a rate that changes evenly leads.  ValueError: longer or shorter than can be.
-        """
+        if not self.plan.from_outside or self.ended or self.stopped:
+            return
         L, c, _ = length_at.py_func(self.law, begin)
+        length, rate = asked or (None, c)
         dt = end - begin
         to = self._checked(L + 0.5 * (c + rate) * dt if length is None else length)
         mean = (to - L) / dt
