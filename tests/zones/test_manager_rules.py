@@ -100,18 +100,22 @@ def test_a_rod_that_is_blended_in_gets_all_of_its_stiffness_after_a_failed_step(
     assert any("all of its stiffness" in x.text for x in change.reasons)
 
 
+@pytest.mark.parametrize("first", [True, False])
 @pytest.mark.parametrize("why", ["twisted", "loaded", ""])
-def test_torque_asks_for_rods_from_end_to_end(why: str) -> None:
+def test_torque_asks_for_rods_from_end_to_end(why: str, first: bool) -> None:
     """A torsion ratio of 3 in one cell is one of all, where both ends hold the twist or a moment is given."""
     found = manager("CCCCCCCCCC", [0, 0, 0, 0, 0, 0, 0, 0, 0, 1])
     found.twisted = why == "twisted"
     if why == "loaded":
         found.load(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
     found.ratios[TORSION, 2] = 3.0
-    found._add_global_ratios()
+    if first:
+        found.initial_rods(state_on(on(found.cable, found.layout), along(), 1e6))
+    else:
+        review_of(found)
     others = 3.0 if why else 0.0
-    assert found.ratios[TORSION].tolist() == [others] * 2 + [3.0] + [others] * 7
-    assert found.ratios[GIVEN, 9] > 1.0 and not found.ratios[GIVEN, :9].any()
+    assert found.seen[TORSION].tolist() == [others] * 2 + [3.0] + [others] * 7
+    assert found.seen[GIVEN, 9] > 1.0 and not found.seen[GIVEN, :9].any()
 
 
 def test_only_catenaries_that_are_far_above_a_threshold_reject_a_step() -> None:
