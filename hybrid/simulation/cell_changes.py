@@ -35,8 +35,7 @@ from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
 from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching
-from hybrid.zones.manager import OF_BASE, all_zones
-from hybrid.zones.plan import Change
+from hybrid.zones.manager import OF_BASE, Change, all_zones
 
 LEAST_CELLS = 3  # with which tables are made
 MOST_PLACES = 20_000  # nodes of lines whose outputs may wait, in all

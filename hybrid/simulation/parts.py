@@ -22,7 +22,7 @@ from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkTaken
-from hybrid.zones.plan import Change
+from hybrid.zones.manager import Change
 
 # What is asked of several parts is asked in this order.
 ORDER = (

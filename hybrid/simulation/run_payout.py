@@ -34,8 +34,7 @@ from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState
 from hybrid.zones.at_start import rods_at_winch
 from hybrid.zones.change import ZoneSwitching, change_base
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Change, Reason
+from hybrid.zones.manager import Change, DomainManager, Reason
 
 # Nodes by which cells are merged before the one leaves at which they must be whole: merged then, where the reel still
 # brings lengths to their true ones, they kicked the pull by 0.14 % of its mean, a node before by 0.09 %.

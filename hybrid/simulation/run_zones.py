@@ -47,8 +47,7 @@ from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps, Tried
 from hybrid.store.integrity import matched
 from hybrid.zones.change import LETTING_GO, LONGEST_IN_RAMP, READY, ZoneSwitching, on_layout
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Change
+from hybrid.zones.manager import Change, DomainManager
 
 if TYPE_CHECKING:
     from hybrid.simulation.run_payout import PaidZones, RunPayout

@@ -25,8 +25,7 @@ from hybrid.scene.motion_checks import longest_period
 from hybrid.scene.schema import LineScene
 from hybrid.zones.change import ZoneSwitching, on_layout
 from hybrid.zones.criteria import UserCriterion, shares_asked
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Times
+from hybrid.zones.manager import Allowed, DomainManager, Times
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps;
 # and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.

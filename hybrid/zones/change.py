@@ -22,8 +22,7 @@ from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, on_other_parts
 from hybrid.solve.network_steps import Tried
 from hybrid.store.integrity import matched
-from hybrid.zones.manager import OF_BASE, DomainManager
-from hybrid.zones.plan import Change
+from hybrid.zones.manager import OF_BASE, Change, DomainManager
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many ramp times.
 LETTING_GO = 1.0

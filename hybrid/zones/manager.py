@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,21 @@ from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_lengths import FADE
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION, shares
-from hybrid.kernels.mesh.zone_plan import OFF, blank_review_job, reach, review_zones, widen
+from hybrid.kernels.mesh.zone_plan import (
+    OFF,
+    blank_review_job,
+    mark_spread,
+    mark_wanted,
+    reach,
+    review_zones,
+    tidy,
+    widen,
+)
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.material import Material, tension_floor
 from hybrid.model.mesh import Layout, LineOnBase, edges
 from hybrid.zones.criteria import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
-from hybrid.zones.plan import Allowed, Change, Reason, Times, spread, tidied, wanted
 
 # Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension
 # it is weight that straightens a cable.
@@ -37,6 +46,78 @@ LOST_TENSION = 0.3  # remaining part of a tension, from which on it is being los
 WEIGHTLESS = 1e-3  # tension floor over tension scale, below which a cable counts as one without weight
 LONGEST_WAIT = 8.0  # hold times that a rod is kept below threshold, where earlier ones were released too soon
 SHORTEST = 2  # cells that make a zone
+
+
+class Allowed(NamedTuple):
+    """What leaving bending out, and lengths of cells, may make wrong.
+
+    tolerance: m, of position.  curvature_error: part of the largest curvature that the length of cells, which follow
+    it, may make it wrong by; None: they stay as they are.  asked: parts of the largest tension, curvature and moment
+    (numbers of mesh.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow
+    the curvature are so many times as short as that asks for.
+    """
+
+    tolerance: float
+    curvature_error: float | None = None
+    asked: Mapping[int, float] = MappingProxyType({})
+    fineness: float = 1.0
+
+
+class Times(NamedTuple):
+    """Times of zones, s.
+
+    hold: how long a rod must have been below its thresholds; ramp: of bending stiffness, None: hold.  edge: for which
+    the way of a contact edge is foreseen, None: ramp.  period: the longest of the motion, over some of which its
+    largest values count.
+    """
+
+    hold: float
+    ramp: float | None = None
+    edge: float | None = None
+    period: float = 0.0
+
+
+class Reason(NamedTuple):
+    """Why base cells a to b (exclusive) change: kind of event, criterion with its value and threshold, and words."""
+
+    a: int
+    b: int
+    kind: str
+    text: str
+    criterion: str = ""
+    value: float = math.nan
+    threshold: float = math.nan
+
+
+class Change(NamedTuple):
+    """A proposal, (n,) of base cells: what they should be, why, and which must be ramped up fast."""
+
+    rod: np.ndarray
+    reasons: tuple[Reason, ...]
+    urgent: np.ndarray
+    stiff: np.ndarray  # rods that get their full stiffness at once
+    same: bool = False  # whether cells change and nothing else
+
+
+def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
+    """Base cells (n,) that ask to be, or to stay, a rod: hysteresis between 1 and the criterion's `off`."""
+    out = np.empty(rod.size, bool)
+    mark_wanted(ratios, OFF, rod, out)
+    return out
+
+
+def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
+    """Base cells within the buffer of those that ask."""
+    out = np.empty(asks.size, bool)
+    mark_spread(asks, base, buffer, out)
+    return out
+
+
+def tidied(flags: np.ndarray, rod: np.ndarray, shortest: int) -> np.ndarray:
+    """No rod and no gap between rods of less than `shortest` cells: rods widen, into what was rod first; gaps close."""
+    out = flags.copy()
+    tidy(out, rod, shortest, np.empty_like(out))
+    return out
 
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.

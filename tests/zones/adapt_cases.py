@@ -23,8 +23,7 @@ from hybrid.model.material import Material, material
 from hybrid.model.mesh import Layout
 from hybrid.scene.read import one_line
 from hybrid.zones.change import transfer_to
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Times
+from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 Shape = Callable[[Floats], Floats]

@@ -17,8 +17,7 @@ from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, advance
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.kernels.state.state import no_sea
 from hybrid.zones.criteria import NodeState, cell_ratios, of_line
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Times
+from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene
 
 STEP = 0.02

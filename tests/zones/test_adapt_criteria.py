@@ -23,8 +23,7 @@ from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_R
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.material import TENSION_FLOOR, Material
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Times, wanted
+from hybrid.zones.manager import Allowed, DomainManager, Times, wanted
 from tests.scenes import clamped_at, pinned_at
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`

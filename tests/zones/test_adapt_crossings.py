@@ -47,8 +47,7 @@ from problems import Scene
 
 import hybrid
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD
-from hybrid.zones.manager import BUFFER
-from hybrid.zones.plan import spread
+from hybrid.zones.manager import BUFFER, spread
 
 Floats = np.ndarray
 DT = 0.02

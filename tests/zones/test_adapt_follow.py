@@ -25,8 +25,7 @@ from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.criteria import shares_asked
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Change, Times
+from hybrid.zones.manager import Allowed, Change, DomainManager, Times
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.zone_plan import OFF, widen
 from hybrid.model.mesh import edges
-from hybrid.zones.plan import spread, wanted
+from hybrid.zones.manager import spread, wanted
 
 K = len(CRITERIA)
 ALL = range(K)

@@ -23,8 +23,7 @@ from hybrid.simulation.run_sample import compared_cells, usual_cells
 from hybrid.store.records import MeshHistory, ZoneHistory, node_bits
 from hybrid.store.records import Zone as ZoneRow
 from hybrid.zones.change import transfer_to
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Times
+from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene, pinned_at
 
 

@@ -20,8 +20,7 @@ from hybrid.model.resolution import first_resolution
 from hybrid.scene.analysis import AdaptiveModel
 from hybrid.scene.read import one_line
 from hybrid.simulation.zones_at_rest import managers_for
-from hybrid.zones.manager import DomainManager
-from hybrid.zones.plan import Allowed, Change, Times
+from hybrid.zones.manager import Allowed, Change, DomainManager, Times
 
 HOLD = 2.0  # s
 
