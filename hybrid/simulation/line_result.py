@@ -164,8 +164,7 @@ class LineResult:
         self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self.marked = marked_places(scene, model)
         self.envelope.itself.on &= wanted.record is not None or bool(model.line.bits & MAY_TOUCH)
-        self._itself = self.envelope.itself
-        self._itself.renew(model)
+        self.envelope.itself.renew(model)
         self.lets_touch = True  # whether contact begins by itself where the line comes near itself
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
         self.has_neared_itself = False  # whether that was so at some time
@@ -295,12 +294,12 @@ class LineResult:
     def note_start(self, x: JoinedLine, state: State, t: float | None) -> None:
         """What a first state leaves open, be it an equilibrium or not."""
         self.judge(t, sharpest(x.line, x.ends, state), state)
-        if self._itself.check(t or 0.0, state, self.events.event) & NEARS:
+        if self.envelope.itself.check(t or 0.0, state, self.events.event) & NEARS:
             self.meets_itself(t or 0.0, 0.0)
 
     def is_near_itself(self, t: float, state: State, step: float) -> bool:
         """Whether contact that may begin has to at the state at t (s), from which steps (s) are to be made."""
-        return self._itself.is_near(t, state, step)
+        return self.envelope.itself.is_near(t, state, step)
 
     def meets_itself(self, t: float, dt: float) -> None:
         """An event, unless there was one, where contact could not begin after the step of dt (s) to t (s)."""
@@ -329,7 +328,7 @@ class LineResult:
         self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.books.hinges[:] = model.hinges
         self.diagnostics.use_model(model)
-        self._itself.renew(model)
+        self.envelope.itself.renew(model)
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
 
@@ -357,24 +356,24 @@ class LineResult:
         """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
         self.model = model
         self.diagnostics.use_model(model)
-        self._itself.set_model(model)
+        self.envelope.itself.set_model(model)
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""
         self.model = model
         self.diagnostics.use_model(model)
-        self._itself.adopt_cells(model)
+        self.envelope.itself.adopt_cells(model)
 
     @property
     def watch_table(self) -> Table | None:
         """Of what looks how near the line comes to itself in steps; None: nothing does."""
-        return self._itself.running
+        return self.envelope.itself.running
 
     # --- steps and outputs --------------------------------------------------------------------------
 
     def attach(self, solver: NetworkSolver, states: tuple[State, State], clock: Clock, counts: Counts) -> None:
         """Steps of a solver go on with the line, between two states in turn; clock, counts: of the run."""
-        solver.bind_line(self.number, **self._itself.attach(states, clock, counts))
+        solver.bind_line(self.number, **self.envelope.itself.attach(states, clock, counts))
 
     def log(self, rows: Floats) -> None:
         """Log steps (n, len(LOG) + 1), the last column the time of the processor, s."""
@@ -383,12 +382,12 @@ class LineResult:
     def note_nearness(self, solver: NetworkSolver, seen: int, t: float, dt: float, state: State) -> None:
         """What the step of dt (s) to t (s) has seen (bits of kernels.state.books) of how near the line is to itself."""
         if seen & IS_BENT:
-            found, bound = self._itself.bends()
+            found, bound = self.envelope.itself.bends()
             solver.bind_line(self.number, **bound)
         else:
             found = sum(bit for flag, bit in WATCHED.items() if seen & flag)
         hides = bool(found & HIDES) and not self.lets_touch
-        found = self._itself.judge(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
+        found = self.envelope.itself.judge(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
         self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
 
     def watch_itself_no_more(self, solver: NetworkSolver) -> None:
