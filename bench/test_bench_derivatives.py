@@ -17,9 +17,8 @@ import pytest
 from derivative_scenes import KINDS, keys_of, scene_at_rest
 
 import hybrid
-from hybrid.designs.network_at_rest import Places
+from hybrid.designs.network_at_rest import Places, at_rest
 from hybrid.designs.numbers import with_number
-from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene
 from tests.designs.test_body_derivatives import SCENES as SCENES_OF_BODIES
 

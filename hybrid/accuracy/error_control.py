@@ -9,17 +9,16 @@ docs/errors.md
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from hybrid.accuracy.error_order import COARSER
 from hybrid.accuracy.line_errors import LineErrors
-from hybrid.accuracy.model_choice import Comparable, goes_by_cells, with_model_errors
+from hybrid.accuracy.model_choice import goes_by_cells, with_model_errors
 from hybrid.accuracy.refinement import COSTLY_ACCURACY, NOT_KEPT, costly, is_no_better, not_kept_text
 from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
@@ -27,18 +26,10 @@ from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
+from hybrid.simulation.case import Case
 from hybrid.simulation.restart import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample, Samples, restored_notes
 from hybrid.store.integrity import Tree, matched
-
-Beside = AbstractContextManager[Sequence[Callable[[], Samples]]]
-
-
-class Compares(Comparable, Protocol):
-    """What computes the runs that a result is compared with; all raise ComputationError."""
-
-    def beside(self, samples: Sequence[Callable[[], Samples]]) -> Beside:
-        """Several of them at the same time (simulation.case)."""
 
 
 def comparison_resolutions(
@@ -66,7 +57,7 @@ class ErrorController:
     """
 
     lines: Mapping[str, LineErrors]
-    case: Compares
+    case: Case
     result: Callable[[NetworkResolution], Samples]
     decide: Callable[[bool], None] = lambda kept: None
     budget: Budget | None = None  # of all results; None: there is no limit
@@ -105,7 +96,7 @@ class ErrorController:
             self.notes.clear()
             for line in self.lines.values():
                 line.comparisons = None
-                line.forget_notes()
+                line.own_notes.clear()
             self._lost = False
         unknown: Samples | None = None  # the last result, as long as its errors are not known
         while self.next is not None:
@@ -126,7 +117,8 @@ class ErrorController:
                     continue
             if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self.notes):
                 self.notes += costly(self.runs, next(iter(self.standing.values())), self.next.one)
-        self._note_missed()
+        for line in self.lines.values():
+            line.note_missed()
 
     def _goes_on(self, error: ComputationError, resolution: NetworkResolution, unknown: Samples | None) -> bool:
         """Whether another result follows one that has failed; raises the error where there is none before it."""
@@ -171,15 +163,6 @@ class ErrorController:
     def _lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
         for line in self.lines.values():
             line.lacks_errors(error, what)
-
-    def _note_missed(self) -> None:
-        """Say of each line that misses what is asked."""
-        for line in self.lines.values():
-            if line.asked is None or line.estimate is None:
-                continue
-            verdict = line.verdict(line.asked)
-            if verdict.ratio > 1.0:
-                line.note_missed(verdict)
 
     def without_refinement(self, why: str) -> None:
         """Say what the result misses as it is, where a finer one did not come to its end."""
@@ -238,9 +221,10 @@ class ErrorController:
         kept, notes = {k: x.state() for k, x in self.lines.items()}, list(self.notes)
         before = {name: x[0] for name, x in kept.items() if x[0] is not None}
         try:
-            stricter = [k for k, x in self.lines.items() if x.is_stricter(resolution.lines[k])]
-            anew = any(self.lines[k].estimate.differs_in_zones(result[k]) for k in stricter)  # type: ignore[union-attr]
-            anew = anew or self._touches_now(result)
+            known = {k: x.estimate for k, x in self.lines.items() if x.estimate is not None}
+            # zones that may leave out less than those of the result before
+            stricter = [k for k, x in known.items() if resolution.lines[k].zones < x.run.resolution.zones]
+            anew = any(known[k].differs_in_zones(result[k]) for k in stricter) or self._touches_now(result)
             if anew:  # runs to compare with have other zones, or no contact
                 self._compare(resolution)
                 anew = self._is_compared
@@ -275,7 +259,10 @@ class ErrorController:
             self._compare(self.first or _finely(result))  # with contact now
         faster, judged = cache(self._in_shorter_steps), []
         for name, line in self.lines.items():
-            shorter = partial(_of_line, faster, name)
+
+            def shorter(name: str = name) -> RunSample | None:
+                return (faster() or {}).get(name)
+
             if (name not in before or anew) and line.first_estimate(result[name], shorter):
                 judged.append(name)
             elif name in before:
@@ -388,11 +375,6 @@ class ErrorController:
         self.standing = {k: x.estimate.run for k, x in self.lines.items() if x.estimate is not None}
         if self.next is None and not self.known:
             raise ValueError("neither a result nor one that is to come")
-
-
-def _of_line(faster: Callable[[], Samples | None], name: str) -> RunSample | None:
-    found = faster()
-    return None if found is None else found[name]
 
 
 def _finely(runs: Samples) -> NetworkResolution:

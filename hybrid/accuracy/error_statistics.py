@@ -275,7 +275,8 @@ def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
     return {
         statistic: replace(
             run, every=1, rows={}, forces=kept[statistic], catenary=run.catenary[:0],
-            values={name: _as_vector(name, x[k]) for name, x in found.items()},
+            values={name: np.stack([x[k], 0.0 * x[k], 0.0 * x[k]], axis=-1) if name in END_FORCES else x[k]
+                    for name, x in found.items()},
             model_error={name: x[k] for name, x in errors.items()},
         )
         for k, statistic in enumerate(STATISTICS)
@@ -390,10 +391,6 @@ def _thinned(x: np.ndarray, step: int) -> np.ndarray:
 
 def _scalar(name: str, x: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(x, axis=-1)) if name in END_FORCES else x
-
-
-def _as_vector(name: str, x: np.ndarray) -> np.ndarray:
-    return np.stack([x, 0.0 * x, 0.0 * x], axis=-1) if name in END_FORCES else x
 
 
 def _windows(x: np.ndarray, windows: int) -> Iterator[np.ndarray]:

@@ -20,12 +20,20 @@ from scipy.sparse.linalg import splu
 
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
+from hybrid.kernels.junctions.bodies import DAMPING
 from hybrid.kernels.state.report import BENDING_SLIP, BODIES, DRAG, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import BELOW, lowest_modes
-from hybrid.linear.loaded_line import LoadedLine, frequencies_of
-from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
+from hybrid.linear.loaded_line import LoadedLine, frequencies_of, loaded_lines
+from hybrid.linear.matrices import (
+    ANCHOR,
+    LinearNetwork,
+    in_inertial_axes,
+    in_last,
+    linear_network,
+    rows_at_rest,
+    sparse_rows,
+)
 from hybrid.linear.touching import Rest, rest_of
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.motion_tables import Motion
@@ -132,7 +140,8 @@ def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Ma
     if not _is_steady(found):
         return {}
     breaks = sorted({0.0, *(x for motion in motions for x in _breaks(motion) if x < quiet)})
-    return Vibrations(found).lost(breaks, min(quiet, float(times[-1])), np.asarray(times), _radius(asked))
+    radius = asked.time.rho_inf if asked.time is not None else 0.5
+    return Vibrations(found).lost(breaks, min(quiet, float(times[-1])), np.asarray(times), radius)
 
 
 def _quiet_from(motion: Motion) -> float | None:
@@ -160,10 +169,6 @@ def _is_steady(rest: Rest) -> bool:
     return not any(x.loads or x.members is not None for x in rest.floats)
 
 
-def _radius(asked: Scene) -> float:
-    return asked.time.rho_inf if asked.time is not None else 0.5
-
-
 class Vibrations:
     """Modes of a network about its equilibrium, of mass 1, and what damps and drives each.
 
@@ -174,12 +179,8 @@ class Vibrations:
     def __init__(self, rest: Rest) -> None:
         self.rest = rest
         network = linear_network(rest.solver, rest.states, rest.names, sticks=True, touching=rest.touching)
-        omegas = frequencies_of(rest.models)
-        self.lines = [
-            LoadedLine(x, linear, model, omegas)
-            for x, linear, model in zip(rest.solver.lines, network.lines, rest.models, strict=True)
-        ]
-        self.omegas = omegas
+        self.omegas = frequencies_of(rest.models)
+        self.lines = loaded_lines(rest, network, self.omegas)
         free = 2 + len(self.lines) + 3 * network.bodies  # that may have no period
         eigen = lowest_modes(network, min(MODES * len(self.lines), MOST_MODES) + free)
         self.stable = bool(eigen.squares.min() > -HELD * np.abs(eigen.squares).max())
@@ -203,12 +204,8 @@ class Vibrations:
             blocks.append(sparse_rows(moving - still))
         found = network.place.T @ sparse.block_diag(blocks, format="csr") @ network.place
         found = found + network.whole.T @ network.touching.damping @ network.whole
-        frames = [np.kron(np.eye(2), state[FRAME:V].reshape(3, 3)) for state in self.rest.states.bodies]
-        own = [
-            R @ row[DAMPING:][:36].reshape(6, 6) @ R.T for R, row in zip(frames, self.rest.solver.bodies, strict=True)
-        ]
-        first = network.size - 6 * network.bodies
-        return sparse.csr_array(found + sparse.block_diag([sparse.csr_array((first, first)), *own], format="csr"))
+        own = in_inertial_axes(self.rest.solver, self.rest.states, DAMPING)
+        return sparse.csr_array(found + in_last(network.size, own))
 
     def _forced(self, network: LinearNetwork) -> Iterator[Floats]:
         """Velocities (F, N+1, 3) m/s of each line, as it follows the harmonics of ends at rest, complex amplitudes."""

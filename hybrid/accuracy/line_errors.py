@@ -111,7 +111,7 @@ class LineErrors:
     _at_rest: bool = False  # whether the run to compare with that has failed did so before it moved
     _slow_from: list[float] | None = None  # cells and steps of the first result, where errors fell slowly until then
     _every: int = 1  # outputs to one of which the statistics are
-    _notes: list[tuple[str, str]] = field(default_factory=list)
+    own_notes: list[tuple[str, str]] = field(default_factory=list)
     _statistics: dict[str, StatisticEstimate] = field(default_factory=dict)
     _of_statistics: Callable[[], dict[str, StatisticEstimate]] | None = None  # what they are to be estimated by
 
@@ -130,7 +130,7 @@ class LineErrors:
     def notes(self) -> tuple[tuple[str, str], ...]:
         """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
         found = self.estimate
-        own = [*self.choice.notes, *self._notes, *self._irregular_note()]
+        own = [*self.choice.notes, *self.own_notes, *self._irregular_note()]
         own += not_converged(self.diverging, self.asked)
         return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
 
@@ -182,13 +182,13 @@ class LineErrors:
     def halve(self) -> None:
         """Forget that errors are not known: a result of cells half as long follows."""
         self._judged += 1
-        self._notes.pop()
+        self.own_notes.pop()
 
     def lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
         """Note that errors are not known, as such a run has failed."""
         self._at_rest = error.t is None
         text = f"error not known: a {what} failed: {str(error).splitlines()[0]}"
-        self._notes.append(("no error figure", text))
+        self.own_notes.append(("no error figure", text))
 
     @property
     def places(self) -> np.ndarray | None:
@@ -248,7 +248,7 @@ class LineErrors:
         if self.asked is not None:  # else its model error was to be followed
             verdict = self.verdict(self.asked)
             if verdict.ratio > 1.0:
-                self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
+                self.own_notes.append(("accuracy missed", f"{verdict.text}; {why}"))
         return run, errors
 
     def first_estimate(self, result: RunSample, faster: Callable[[], RunSample | None] = lambda: None) -> bool:
@@ -257,7 +257,7 @@ class LineErrors:
         faster: computes the first of them in steps as short as those of the result; None: it fails.
         """
         if self.comparisons is None:
-            self._notes += result.notes
+            self.own_notes += result.notes
             return False
         estimate = Estimate(result, *self.comparisons, self.from_rest, self.rubs)
         if estimate.share_unknown and (run := faster()) is not None:
@@ -274,15 +274,15 @@ class LineErrors:
                     "cells follow the curvature, and nearly all are base cells, which stay: coarser runs have the same "
                     "ones; a smaller model.curvature_error, or fewer base cells (mesh.cells)"
                 )
-            self._notes.append(("no error figure", f"no error figure: {few}"))
-            self._notes += [*result.notes, *estimate.notes]
+            self.own_notes.append(("no error figure", f"no error figure: {few}"))
+            self.own_notes += [*result.notes, *estimate.notes]
             return False
         if self.moves and not estimate.has_step:
             text = (
                 "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
             )
             fix = "ask for a smaller error" if self.free.steps else "leave time.step out"
-            self._notes.append(("error uncertain", f"{text}; the error may be larger; {fix}"))
+            self.own_notes.append(("error uncertain", f"{text}; the error may be larger; {fix}"))
         self.estimate, self.comparisons = estimate, None
         return True
 
@@ -297,10 +297,6 @@ class LineErrors:
         for name, found in statistics_of(result, self._every).items() if self.statistics else ():
             self.statistics[name].update(found)
 
-    def is_stricter(self, finer: Resolution) -> bool:
-        """Whether zones of a finer result may leave out less than those of the one before."""
-        return self.estimate is not None and finer.zones < self.estimate.run.resolution.zones
-
     def use_model_errors(self, run: RunSample) -> None:
         """Take what leaving bending out changes from a run, in place of what is known."""
         assert self.estimate is not None
@@ -308,22 +304,14 @@ class LineErrors:
         for name, found in statistics_of(run, self._every).items() if self.statistics else ():
             self.statistics[name].set_model_errors(found)
 
-    def note(self, kind: str, text: str) -> None:
-        """An event of the line."""
-        self._notes.append((kind, text))
-
-    def forget_notes(self) -> None:
-        """What was noted is to be noted again."""
-        self._notes.clear()
-
     def state(self) -> tuple[Any, ...]:
         """What a finer result changes, for `go_back`."""
         before = self.judged(True).copied() if self.estimate is not None else None
-        return before, self.extremes, self.excess, list(self._notes)
+        return before, self.extremes, self.excess, list(self.own_notes)
 
     def go_back(self, state: tuple[Any, ...]) -> None:
         """Be as before a finer result."""
-        before, self.extremes, self.excess, self._notes[:] = state
+        before, self.extremes, self.excess, self.own_notes[:] = state
         if before is not None:
             self.estimate, self.statistics = before.estimate, dict(before.statistics)
 
@@ -341,7 +329,9 @@ class LineErrors:
         assert self.estimate is not None
         if self.asked is None:
             return None
-        run, before, asked = self.estimate.run, self._ratio, self._asked_further(self.asked)
+        run, before, asked = self.estimate.run, self._ratio, self.asked
+        if self.extremes is not None:  # not what limits ask for whose extremes a finer result showed no better
+            asked = replace(asked, limits=tuple(x for x in asked.limits if not self.extremes.stalls(x.limit)))
         verdict = self.verdict(asked)
         if verdict.limit or asked.limits != self.asked.limits:  # what is asked of a limit, and judged, has changed
             before = np.inf
@@ -374,12 +364,6 @@ class LineErrors:
         # cells that are hardly shorter lie otherwise beside edges of contact: their change says little of what is left;
         # and what is used of a limit grows by about its error, so that less is left
         return replace(found, fineness=max(found.fineness, COARSER * run.resolution.fineness))
-
-    def _asked_further(self, asked: RequestedAccuracy) -> RequestedAccuracy:
-        """What a finer result may still bring: not what limits ask for whose extremes a finer one showed no better."""
-        if self.extremes is None:
-            return asked
-        return replace(asked, limits=tuple(x for x in asked.limits if not self.extremes.stalls(x.limit)))
 
     def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
         """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""
@@ -429,10 +413,14 @@ class LineErrors:
         diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
         return bool(diverges) or is_chance(self.statistics, verdict.statistic, name)
 
-    def note_missed(self, verdict: Verdict) -> None:
-        """Say that what was asked is not met, whose doing it is, and what to try."""
-        text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict), self.stopped)
-        self._notes.append(("accuracy missed", text))
+    def note_missed(self) -> None:
+        """Say that what was asked is not met, if so, whose doing it is, and what to try."""
+        if self.asked is None or self.estimate is None:
+            return
+        verdict = self.verdict(self.asked)
+        if verdict.ratio > 1.0:
+            text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict), self.stopped)
+            self.own_notes.append(("accuracy missed", text))
 
     def checkpoint(self) -> Tree:
         """What it has found until now, as named arrays and plain values."""
@@ -441,7 +429,7 @@ class LineErrors:
             "estimate": self.estimate and self.estimate.checkpoint(),
             "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
             "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
-            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
+            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self.own_notes),
             "extremes": self.extremes and self.extremes.checkpoint(),
             "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
         }  # fmt: skip
@@ -476,7 +464,7 @@ class LineErrors:
         self._slow_from = list(saved["slow"]) or None
         if self._every < 1:
             raise ValueError("statistics of no outputs")
-        self._notes = list(restored_notes(saved["notes"]))
+        self.own_notes = list(restored_notes(saved["notes"]))
         if saved["coarse"] is not None:
             try:
                 first, second, third = (

@@ -16,10 +16,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from math import ceil, isinf
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from hybrid.accuracy.error_order import magnitude
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.model.build import Model
 from hybrid.model.mesh import GROWTH, Grading
-from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.network import NetworkResolution, build_system
 from hybrid.model.payout import payout_of
 from hybrid.model.plan import (
     REST,
@@ -69,20 +68,7 @@ class _EndCell(NamedTuple):
     parts: np.ndarray  # (2, n) of the values at these two, in the values within
 
 
-class Comparable(Protocol):
-    """What of a case is asked here."""
-
-    scene: Any
-    moves: bool
-    points: dict[str, OutputPoints]
-
-    @property
-    def names(self) -> Mapping[str, str]: ...
-    def instead(self, scene: Any) -> AbstractContextManager[None]: ...
-    def sample(self, resolution: NetworkResolution) -> Samples: ...
-
-
-def with_model_errors(case: Comparable, runs: Samples, costs: list[float]) -> Samples:
+def with_model_errors(case: Case, runs: Samples, costs: list[float]) -> Samples:
     """A run with what leaving bending out changes in it.
 
     costs: s of processor time, to which that of the rods is added.  All lines get the error, because what one of them
@@ -112,7 +98,7 @@ def _in_steps_of(run: RunSample) -> Resolution:
     return replace(run.resolution, local=None, ends=tuple(run.forces[:, 0].tolist()))
 
 
-def goes_by_cells(case: Comparable, runs: Samples) -> bool:
+def goes_by_cells(case: Case, runs: Samples) -> bool:
     """Whether longer cells do not show what leaving bending out changes, or hardly cost less.
 
     They do not beside joints of rods and catenaries, and where a line touches down: bending fades within a cell there.
@@ -152,7 +138,7 @@ def as_rods(
     model, tables, finely = build_system(network, resolution=resolution), {}, dict(resolution.lines)
     ends: dict[str, list[_EndCell]] = {}
     for name, run in runs.items():
-        line, s = _model_of(model, name), points[name].s
+        line, s = model.models[model.names.index(name)], points[name].s
         tension = np.asarray(run.values["tension"]).max(axis=0)
         nodes, s = _nodes(line, run.rods), s[run.places] if run.places.size else s
         ends[name] = list(_end_cells(line, nodes, s))
@@ -175,10 +161,6 @@ def _difference(run: RunSample, rods: RunSample, ends: Iterable[_EndCell]) -> di
     for x in ends if "curvature" in found else ():
         found["curvature"][:, x.within] = found["curvature"][:, list(x.nodes)] @ x.parts
     return found
-
-
-def _model_of(model: NetworkModel, name: str) -> Model:
-    return model.models[model.names.index(name)]
 
 
 def _joined(stretches: Stretches) -> list[tuple[float, float]]:

@@ -167,18 +167,12 @@ def _of_line(case: Case, control: ErrorController, name: str, cpu: float, vibrat
     def others(happened: Happened) -> tuple[dict[str, str | float | int], list[tuple[str, str]]]:
         found, notes = known(scene, line, result, errors, happened, vibrations)
         if line.asked is not None:
-            found["accuracy_verdicts"] = accuracy_figures(line, result, errors)
+            of = [x.errors for x in line.statistics.values()] if line.irregular else [errors]
+            each = figures(line.asked, [x for x in of if x is not None], result, line.scattered, line.extremes)
+            found["accuracy_verdicts"] = json.dumps(each)
         return attributes | found, notes
 
     return Report(fields, blocks(), others)
-
-
-def accuracy_figures(control: LineErrors, result: RunSample, errors: Errors | None) -> str:
-    """What is asked of each quantity and its error, as the attribute of a result; errors: None: they are not known."""
-    assert control.asked is not None
-    of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
-    known = [x for x in of if x is not None]
-    return json.dumps(figures(control.asked, known, result, control.scattered, control.extremes))
 
 
 def effort(scene: LineScene, control: LineErrors, result: RunSample, cpu: float) -> dict[str, str | float | int]:
@@ -238,19 +232,15 @@ def error_fields(result: RunSample, errors: Errors) -> list[Field]:
     """Errors by cause and quantity."""
     return [
         Field(
-            f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
+            f"errors/{cause}/{name}", UNITS[name],
+            f"{CAUSES[cause]} of {name.removeprefix('right_').replace('_', ' ')}"
+            f"{' just after the point' * name.startswith('right_')}, estimated",
             (result.places[-1] + 1,) if result.places.size and is_along(name) else shape[1:],
             ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
         )
         for cause, quantities in errors.fields.items()
         for name, shape in quantities.items()
     ]  # fmt: skip
-
-
-def _words(name: str) -> str:
-    """A quantity in words."""
-    after = " just after the point" if name.startswith("right_") else ""
-    return name.removeprefix("right_").replace("_", " ") + after
 
 
 class Passes:
@@ -331,7 +321,8 @@ class Passes:
                 case.late_file.drop()
                 case.late_file = None
             emptied(target, error)
-            compute = FinerResult(target, self._anew, self._finer, case.decide, goes_on=case.moves)
+            anew = lambda finely, to: case.record(finely, to, self._result_of())  # noqa: E731  # of another model
+            compute = FinerResult(target, anew, self._finer, case.decide, goes_on=case.moves)
         why = "catenaries, which cost less, were tried: "
         self._choices = {name: x.choice for name, x in control.lines.items() if x.choice.kind}
         self._choices |= {name: ModelChoice("rod", why + text) for name, text in failed.items()}
@@ -349,10 +340,6 @@ class Passes:
         if self.remaining is None or self.remaining.anew or self.source is None or not isinstance(to, Path):
             return self.case.record(resolution, to, self._result_of())
         return self.case.resume(self.source, to, self._result_of())
-
-    def _anew(self, resolution: NetworkResolution, to: Path | io.BytesIO) -> Samples:
-        """The first result of another model."""
-        return self.case.record(resolution, to, self._result_of())
 
     def _finer(self, resolution: NetworkResolution, to: Path | io.BytesIO) -> Samples:
         """A finer result beside the one that is there, or the rest of it."""

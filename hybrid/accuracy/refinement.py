@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10, sqrt
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -344,7 +344,6 @@ def refined(resolution: Resolution, verdict: Verdict, free: Free, most: float = 
 
 Target = Path | io.BytesIO
 Record = Callable[[NetworkResolution, Target], Samples]
-T = TypeVar("T")
 
 # The kind of event that says a finer run is not returned.
 NOT_KEPT = "finer run not kept"
@@ -460,30 +459,37 @@ def _holds(asked: RequestedAccuracy, estimate: Estimate, other: RunSample, skip:
     return True
 
 
-class Replacement:
-    """Records finer results beside a complete one; `decide` lets such a one take its place, or drops it."""
+class FinerResult:
+    """Records results one after the other, those after the first beside it.
+
+    `decide` lets such a one take its place, or drops it.
+    """
 
     def __init__(
-        self, target: Target, waits: Callable[[bool], bool] = lambda kept: False, goes_on: bool = False
+        self, target: Target, first: Record, refinement: Record, waits: Callable[[bool], bool], goes_on: bool
     ) -> None:
         """waits: settles one that waits in memory, so that it needs no file; False: none does.
 
         goes_on: whether one that was stopped stays beside, for whoever goes on with it.
         """
-        self.target, self._waits, self.goes_on = target, waits, goes_on
+        self.target, self._first, self._refinement = target, first, refinement
+        self._waits, self._goes_on, self._done = waits, goes_on, False
         self._new: Target | None = None  # complete, and not settled
 
-    def finer(self, record: Callable[[Target], T]) -> T:
-        """Record a finer result, which is then to be settled.
+    def __call__(self, resolution: NetworkResolution) -> Samples:
+        """Record a result; a finer one is then to be settled.
 
         One that fails leaves nothing, and one that is stopped leaves only what can be restarted.
         """
+        if not self._done:
+            found, self._done = self._first(resolution, self.target), True
+            return found
         new = io.BytesIO() if isinstance(self.target, io.BytesIO) else beside(self.target)
         self._new = new
         try:
-            return record(new)
+            return self._refinement(resolution, new)
         except BaseException as error:
-            if not (self.goes_on and isinstance(error, KeyboardInterrupt)):
+            if not (self._goes_on and isinstance(error, KeyboardInterrupt)):
                 self.decide(False)
             raise
 
@@ -505,24 +511,6 @@ class Replacement:
             self.target.seek(0)
             self.target.truncate()
             self.target.write(new.getvalue())
-
-
-class FinerResult(Replacement):
-    """Records results one after the other, those after the first beside it."""
-
-    def __init__(
-        self, target: Target, first: Record, refinement: Record, waits: Callable[[bool], bool] = lambda kept: False,
-        goes_on: bool = True,
-    ) -> None:  # fmt: skip
-        super().__init__(target, waits, goes_on)
-        self._first, self._refinement = first, refinement
-        self._done = False
-
-    def __call__(self, resolution: NetworkResolution) -> Samples:
-        if not self._done:
-            found, self._done = self._first(resolution, self.target), True
-            return found
-        return self.finer(lambda new: self._refinement(resolution, new))
 
 
 def beside(target: Path) -> Path:

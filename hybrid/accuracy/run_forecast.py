@@ -268,7 +268,10 @@ def _of_passes(
 
     setup, motion: s, of a result before its first step, and of its steps; scenes, plans: of the lines by name.
     """
-    one, files = setup + motion, sum(map(_of_file, scenes.values()))
+    one, files = setup + motion, FILE * len(scenes)
+    for scene in scenes.values():
+        points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
+        files += scene.require_time().duration / scene.output_interval * (OUTPUT + POINT * points)
     estimated = sum(map(wants_errors, scenes.values()))
     if not estimated:
         return one + files, one + files
@@ -277,12 +280,6 @@ def _of_passes(
         return first, first
     expected = first + FINER * one
     return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
-
-
-def _of_file(scene: LineScene) -> float:
-    """Processor time, s, of the outputs of a line and of writing them."""
-    points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
-    return scene.require_time().duration / scene.output_interval * (OUTPUT + POINT * points) + FILE
 
 
 def _grown(system: Network) -> float:

@@ -252,16 +252,15 @@ def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identifie
     scenes = scenes_of(task, asked)
     space, keys = space_of(task, asked, scenes)
     equilibria = Equilibria(scenes, keys, measured.wanted)
-    found = fit(measured, equilibria, space)
-    edges = _at_bounds(space, found.point)
-    notes = list(found.notes)
-    notes += [f"{x.name} is at its bound ({x.which}): what was measured would have it beyond" for x in edges]
+    point, found = fit(measured, equilibria, space)
+    edges = _at_bounds(space, point)
+    found["notes"] += tuple(
+        f"{x.name} is at its bound ({x.which}): what was measured would have it beyond" for x in edges
+    )
     return Identified(
-        kept=(), bounds=tuple(edges), minimised=None, minimised_at_start=None, notes=tuple(notes),
-        estimates=found.estimates, correlations=found.correlations, apart=found.apart, count=found.count,
-        scatter=found.scatter, stated=measured.deviations is not None, measured=_places(measured, found.point),
-        histories=_histories(measured, equilibria.point_of(space.start), found.point),
-        **_common(task, asked, equilibria, space, found.point, file),
+        kept=(), bounds=tuple(edges), minimised=None, minimised_at_start=None, measured=_places(measured, point),
+        histories=_histories(measured, equilibria.point_of(space.start), point), **found,
+        **_common(task, asked, equilibria, space, point, file),
     )  # fmt: skip
 
 

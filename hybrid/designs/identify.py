@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.stats import chi2, norm, t
@@ -102,13 +101,11 @@ def measurements(task: TaskFile[Design], scene: AnyScene) -> Measurements:
     by_line = {key: (np.array(x)[:, 0], np.array(x)[:, 1:]) for key, x in places.items()}
     return Measurements(
         [*wanted], np.array(rows), np.array(values), None if np.isnan(stated).any() else stated, by_line,
-        tuple(_history(*key, found) for key, found in histories.items()),
+        tuple(
+            History(*key, np.array([row for _, row in found]), np.array([time for time, _ in found]))
+            for key, found in ((key, sorted(x)) for key, x in histories.items())
+        ),
     )  # fmt: skip
-
-
-def _history(case: str, result: str, found: list[tuple[float, int]]) -> History:
-    t, rows = zip(*sorted(found), strict=True)
-    return History(case, result, np.array(rows), np.array(t))
 
 
 def quantity_of(result: str) -> str:
@@ -242,31 +239,15 @@ class Apart(NamedTuple):
     text: str
 
 
-@dataclass(frozen=True)
-class Fit:
-    """What was found: point; estimates; correlations (n, n), NaN where not known; what cannot be told apart.
-
-    count: numbers that were measured; scatter: root mean square of what is left, in stated deviations or, where there
-    are none, in the unit of what was measured.
-    """
-
-    point: Point
-    estimates: tuple[Estimate, ...]
-    correlations: Floats
-    apart: tuple[Apart, ...]
-    count: int
-    scatter: float
-    notes: tuple[str, ...]
-
-
-def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> Fit:
-    """The values of unknowns nearest to what was measured.
+def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> tuple[Point, dict[str, Any]]:
+    """The values of unknowns nearest to what was measured, and what an `Identified` says of them.
 
     ComputationError, SceneError: where it begins there is no equilibrium, or no such scene.
     """
     rows, values = measured.rows, measured.values
     known = measured.deviations is not None
-    scale = measured.deviations if measured.deviations is not None else np.full(values.size, _typical(values))
+    typical = float(np.abs(values).max(initial=0.0)) or 1.0
+    scale = measured.deviations if measured.deviations is not None else np.full(values.size, typical)
 
     def off(x: Floats) -> Rows:
         point = equilibria.point_of(x)
@@ -281,7 +262,8 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> Fit:
     u, s, v = np.linalg.svd(best.slopes() * sizes, full_matrices=False)
     freedom = values.size - int(np.sum(s > SINGULAR * s.max(initial=0.0)))
     unit = 1.0 if known else math.sqrt(2.0 * best.cost / freedom) if freedom > 0 else math.inf
-    s, v = np.append(s, np.zeros(sizes.size - s.size)), _completed(v)
+    s = np.append(s, np.zeros(sizes.size - s.size))
+    v = v if v.shape[0] == v.shape[1] else np.linalg.svd(v, full_matrices=True)[2]  # with what is at right angles to it
     seen = s > unit / UNKNOWN
     estimates, correlations = _estimates(space.names, best, sizes, s, v, seen, unit, freedom if not known else None)
     finer, notes = _by_cells(equilibria, best, rows, scale, u, s, v, seen, sizes)
@@ -290,16 +272,10 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> Fit:
     scatter = math.sqrt(2.0 * best.cost / values.size) * (1.0 if known else float(scale[0]))
     notes += [f"the search stopped before it was done: {best.stopped}"] if best.stopped else []
     notes += _doubts(best, freedom, known) + _after_each_other(best.values, measured.histories)
-    return Fit(best.point, estimates, correlations, apart, values.size, scatter, tuple(notes))
-
-
-def _typical(values: Floats) -> float:
-    return float(np.abs(values).max(initial=0.0)) or 1.0
-
-
-def _completed(v: Floats) -> Floats:
-    """Rows (m, n), m <= n, with others that are at right angles to them."""
-    return v if v.shape[0] == v.shape[1] else np.linalg.svd(v, full_matrices=True)[2]
+    return best.point, {
+        "estimates": estimates, "correlations": correlations, "apart": apart, "count": values.size, "scatter": scatter,
+        "notes": tuple(notes), "stated": known,
+    }  # fmt: skip
 
 
 def _estimates(
@@ -350,21 +326,14 @@ def _doubts(best: Rows, freedom: int, known: bool) -> list[str]:
     return []
 
 
-def _likeness(left: Floats, histories: Sequence[History]) -> tuple[float, int]:
-    """Correlation of what is left in histories with that at the time before, and of how many pairs it is."""
-    pairs, square, count = 0.0, 0.0, 0
-    for each in histories:
-        x = left[each.rows]
-        pairs, square, count = pairs + float(x[1:] @ x[:-1]), square + float(x @ x), count + x.size - 1
-    return (pairs / square if square > 0.0 else 0.0), count
-
-
 def _after_each_other(left: Floats, histories: Sequence[History]) -> list[str]:
     """Doubts about readings that are no readings by themselves: intervals count each as one.
 
     Of independent ones the correlation is normal, with a deviation of 1 / sqrt(count).
     """
-    likeness, count = _likeness(left, histories)
+    every = [left[x.rows] for x in histories]
+    square, count = sum(float(x @ x) for x in every), sum(x.size - 1 for x in every)
+    likeness = sum(float(x[1:] @ x[:-1]) for x in every) / square if square > 0.0 else 0.0
     if count < FEWEST or likeness * math.sqrt(count) <= norm.isf(DOUBT):
         return []
     times = math.sqrt((1.0 + likeness) / max(1.0 - likeness, 1e-3))

@@ -1,15 +1,8 @@
-"""One line at rest: its residuals when its scene changes, its results, and their gradients.
-
-Gradients are those by the unknowns q.  From them one transposed solve has the derivative of a result g by all numbers:
-dg/dp = λ·∂R/∂p  with  Aᵀλ = ∂g/∂q (theory.md, 22).  A result depends on the unknowns near its place, or near the ends
-of the line.  Only these are moved, each by itself; that no other one counts is tried with all of the others at once.
-"""
+"""One line at rest: its residuals when its scene changes, and its results."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -24,14 +17,14 @@ from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.report import FRICTION, MOMENT_A, NET_A, PLANAR, WAVES
-from hybrid.kernels.state.state import FIELDS, Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
 from hybrid.linear.matrices import ANCHOR, load_layers, rotation
 from hybrid.model.build import Model
 from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.line_result import observer_of
-from hybrid.solve.stepper import POWERS, JoinedLine
+from hybrid.solve.stepper import POWERS
 
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
 ALONG = 1e-5
@@ -39,9 +32,6 @@ ALONG = 1e-5
 KINK, ROUGH = 0.3, 1e-7
 # Forces that do not act at rest, or depend on the way there; and a plane has block rows of its own.
 LEFT_OUT = PLANAR | WAVES | FRICTION
-# Movements from which on a line without what results do not depend on pays; parts within which its results are these,
-# and change as these do along a movement of all unknowns.
-MANY, ALIKE = 3, (1e-11, 1e-6)
 # Of lines that are looked at together what has to be the same, and what results ask for that may differ.
 SAME, VARIES = ("element", "spin"), ("s", "h", "hn", "k0", "kb", "ck", "mass", "force", "rotary", "polar")
 SAME_PLACE = 1e-9  # part of the length within which a node is at a jump
@@ -108,7 +98,7 @@ class LineAtRest:
         self._nodes = any(x.over for x in wanted) or not self._at
         self._observer, self._peak_of = self._observed(self.here), dict[Wanted, Peak]()
         self._values, self._left_here = np.zeros(len(self.wanted)), cast("tuple[Floats, Floats] | None", None)
-        self._line = _at_rest(model.line)
+        self._line = at_rest_alone(model.line)
         self._work, self._still, self._tried = workspace_of(self._line), _without_rates(state), _without_rates(state)
         self._with_rows = self._work._replace(rows=np.zeros((model.line.s.size, SIZE * WIDTH)))
         if state.turn.size and np.abs(state.turn[:, TORQUE]).max() > TURNED * model.tension_scale * model.length:
@@ -124,11 +114,6 @@ class LineAtRest:
             frame[k] = x
         return ends._replace(held=held, frame=frame)
 
-    def joined(self, x: Beside) -> JoinedLine:
-        """The line with ends that nothing holds."""
-        model, ends = x.model, x.ends._replace(held=np.zeros(2, np.int8))
-        return JoinedLine(model.line, x.sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1))
-
     def left(self, x: Beside) -> tuple[Floats, Floats]:
         """Right-hand side (5 (N+1),) of the equations of another line at this state, and its report."""
         if x is not self.here:
@@ -140,7 +125,7 @@ class LineAtRest:
     def _left(self, x: Beside) -> tuple[Floats, Floats]:
         work = self._with_rows
         work.report[:] = 0.0
-        assembly(_at_rest(x.model.line), x.sea, x.ends, self._still, 0.0, ANCHOR, work)
+        assembly(at_rest_alone(x.model.line), x.sea, x.ends, self._still, 0.0, ANCHOR, work)
         right = work.rows.reshape(-1, SIZE, WIDTH)[:, :, -1].copy()
         right[:, 1:] *= -1.0
         for k in self._free:  # what is left over at a point
@@ -184,51 +169,12 @@ class LineAtRest:
         near = 1e-9 * s[-1]
         return np.flatnonzero((s >= ends[x.section] - near) & (s <= ends[x.section + 1] + near))
 
-    def near(self) -> list[int]:
-        """Nodes by which results stand: at their places, at extremes, and at the ends of the line for all others."""
-        s, found = self.model.line.s, set[int]()
-        for x in self.wanted:
-            if x in self._peak_of:
-                found.update(self._peak_of[x].nodes.tolist())
-            elif x.at is None:
-                found.update((0, s.size - 1))
-            else:
-                found.add(int(np.searchsorted(s, min(x.at, s[-1]))))
-        return sorted(found)
-
-    @cached_property
-    def _near(self) -> tuple[Stretch, LineAtRest] | None:
-        """The line by the places of results, whose results are these, and change as these do; None: there is none."""
-        stretch = stretch_of(self.model, self.near()) if self._looked_at_with(self.here) == 0 else None
-        if stretch is None:
-            return None
-        model = replace(stretch.model(self.model), sea=self.model.sea.on(stretch.cells.size))
-        near = LineAtRest(self.here.scene, model, stretch.state(self.state), self.wanted, self._free, self._frames)
-        for x, peak in self._peak_of.items():
-            near._peak_of[x] = peak._replace(nodes=np.searchsorted(stretch.nodes, peak.nodes))
-        near._values = near._of_states(near._output(near.here, near.left(near.here)[1]))[0]
-        q = anywhere(self.state, SIZE)
-        steps = steps_along(self.state, q)
-        both = (
-            [near._values, self._values],
-            [x._by_state(y, steps) for x, y in ((near, q[:, stretch.nodes]), (self, q))],
-        )
-        same = all(np.allclose(a, b, rtol=part, atol=0.0) for (a, b), part in zip(both, ALIKE, strict=True))
-        return (stretch, near) if same else None
-
     def by_state(self, q: Floats, turns: Floats | None = None) -> Floats:
         """(P, W) derivatives of results along movements (P, N+1, 5) of the state.
 
         turns: (P, 2, 3) rad, of the frames of ends; None: they stay.
         """
-        on = self
-        if len(q) >= MANY and self._near is not None:
-            stretch, on = self._near
-            q = q[:, stretch.nodes]
-        return on._by_state(q, steps_along(on.state, q, turns), turns)
-
-    def _by_state(self, q: Floats, steps: Floats, turns: Floats | None = None) -> Floats:
-        """The same, moved by these parts (P,) of the movements."""
+        steps = steps_along(self.state, q, turns)
         moved = displaced(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
         batch = _repeated(self._output(self.here, self._work.report), 2 * len(q))._replace(**cast(Any, moved))
         for end in self._free:
@@ -267,12 +213,8 @@ class LineAtRest:
             values = observer.values_of(observer.observation(self._output(*lines[k])))
             found[k] = self._results(values, [(observer.s, x.model.line.s)])
         for moved, each in groups.items():
-            if len(each) < 2 * MANY or self._near is None:
-                found[each] = self._of_lines([lines[k] for k in each], bool(moved)) if each else found[each]
-                continue
-            stretch, near = self._near
-            short = [(x._replace(model=stretch.model(x.model, VARIES)), y) for x, y in (lines[k] for k in each)]
-            found[each] = near._of_lines(short, bool(moved))
+            if each:
+                found[each] = self._of_lines([lines[k] for k in each], bool(moved))
         return self._slopes(found[::2], found[1::2], steps)
 
     def _of_lines(self, lines: Sequence[tuple[Beside, Floats]], moved: bool) -> Floats:
@@ -382,7 +324,7 @@ class LineAtRest:
         return float(np.interp(x.at, s, value))
 
 
-def _at_rest(line: Line) -> Line:
+def at_rest_alone(line: Line) -> Line:
     """A line without what does not act at rest, or depends on the way there."""
     if not line.bits & LEFT_OUT and not line.torsion.size:
         return line
@@ -437,136 +379,8 @@ def displaced(state: State, q: Floats, steps: Floats) -> dict[str, Floats]:
     return {"r": state.r + q[:, :, 1:4], "e": e, "T": state.T + q[:, 1:, 0], "a1": a}
 
 
-# A line at rest without most of the nodes on which its results do not depend.
-#
-# What results ask for stands beside their places and beside the ends.  Of what lies in between one cell is left, whose
-# numbers mean nothing.
-
-# Nodes that stay to either side of a place and beside ends; and beside what cuts the line.
-REACH, BESIDE_CUTS = 8, 2
-# Part of the nodes that stay, at most: else it does not pay.
-WORTH = 0.5
-
-
-class Stretch:
-    """Which nodes (n,) and cells (n-1,) of a line stay."""
-
-    def __init__(self, nodes: np.ndarray) -> None:
-        self.nodes, self.cells = nodes, nodes[:-1]
-        self._gaps = np.flatnonzero(np.diff(nodes) > 1)
-
-    def line(self, line: Line, names: Sequence[str] = tuple(FIELDS)) -> Line:
-        """The line; names: fields that are cut, others stay as long as they were."""
-        found = {name: getattr(line, name) for name in names}
-        cut = {name: x[self.nodes if FIELDS[name].of_node else self.cells] for name, x in found.items() if x.size}
-        cut["h"][self._gaps] = np.diff(cut["s"])[self._gaps]
-        out: Line = line._replace(**cut)
-        return out
-
-    def model(self, model: Model, names: Sequence[str] = tuple(FIELDS)) -> Model:
-        """A model with the line."""
-        return replace(model, line=self.line(model.line, names))
-
-    def state(self, state: State) -> State:
-        """The state, with straight chords over what is left out."""
-        n = len(state.r)
-        rows = [x[self.nodes] if x.shape[0] == n else x[self.cells] if x.shape[0] == n - 1 else x.copy() for x in state]
-        out = State(*rows)
-        out.e[self._gaps] = np.diff(out.r, axis=0)[self._gaps]
-        return out
-
-
-def stretch_of(model: Model, places: Sequence[int]) -> Stretch | None:
-    """What stays beside nodes where results stand; None: too little could be left out."""
-    s = model.line.s
-    stays = np.zeros(s.size, bool)
-    cuts = [*model.cable.bounds, *model.attached, *(x for zone in model.zones for x in (zone.s_a, zone.s_b))]
-    for reach, nodes in ((REACH, [0, s.size - 1, *places]), (BESIDE_CUTS, [int(np.abs(s - x).argmin()) for x in cuts])):
-        for i in nodes:
-            stays[max(i - reach, 0) : i + reach + 1] = True
-    return Stretch(np.flatnonzero(stays)) if stays.mean() <= WORTH else None
-
-
-def anywhere(state: State, size: int) -> Floats:
-    """(1, N+1, size) a movement of all unknowns that stretches and turns all cells alike."""
-    scale = np.ones(size)
-    scale[0], scale[1:4] = np.abs(state.T).max() or 1.0, np.linalg.norm(state.e, axis=1).mean()
-    out = np.random.default_rng(1).uniform(0.5, 1.0, (1, len(state.r), size)) * scale
-    out[:, 1::2] *= -1.0  # else nodes would go along with their neighbours
-    return np.asarray(out)
-
-
-# Nodes to either side of a place on which a result there may depend, tried in turn; then it is all of the line.
-REACHES = (2, 5)
-# What the others may change of a result, as a part of the most that one unknown changes by a movement as large.
-OUTSIDE = 1e-8
-
-
-class Gradients:
-    """Of all results of a line: by its unknowns, and by turns of its ends."""
-
-    def __init__(self, line: LineAtRest, turning: Sequence[int] = ()) -> None:
-        """turning: ends whose frames turn with what they are joined to."""
-        self._line, self._turning = line, list(turning)
-        self._every = np.ones((line.model.line.s.size, SIZE), bool)
-        self._every[0, 0] = self._every[-1, -1] = False  # there is no cell before the first node, nor behind the last
-
-    def pay_for(self, numbers: int) -> bool:
-        """Whether so many numbers are more than the unknowns that are moved, each of which costs what a number does."""
-        turned = 3 * len(self._turning)
-        fewest = int(np.count_nonzero(self._near(REACHES[0]))) + turned
-        return numbers > fewest and numbers > int(np.count_nonzero(self._moved)) + turned
-
-    @cached_property
-    def by_unknowns(self) -> Floats:
-        """(W, N+1, 5) per m of positions, per N of tensions, per rad of spins."""
-        out = np.zeros((len(self._line.wanted), *self._every.shape))
-        out[:, self._moved] = self._line.by_state(_each(self._moved)).T
-        return out
-
-    @cached_property
-    def by_turns(self) -> Floats:
-        """(W, 2, 3) per rad, by turns of the ends."""
-        out = np.zeros((len(self._line.wanted), 2, 3))
-        for k in self._turning:
-            turns = np.zeros((3, 2, 3))
-            turns[:, k] = np.eye(3)
-            out[:, k] = self._line.by_state(np.zeros((3, *self._every.shape)), turns).T
-        return out
-
-    def _near(self, reach: int) -> np.ndarray:
-        """Which unknowns (N+1, 5) are within a number of nodes of the places of results."""
-        near = np.zeros(len(self._every), bool)
-        for i in self._line.near():
-            near[max(i - reach - 1, 0) : i + reach + 1] = True
-        return np.asarray(self._every & near[:, None])
-
-    @cached_property
-    def _moved(self) -> np.ndarray:
-        """Which unknowns (N+1, 5) are moved."""
-        return next((x for x in map(self._near, REACHES) if self._suffices(x)), self._every)
-
-    def _suffices(self, moved: np.ndarray) -> bool:
-        """Whether results depend on these unknowns and on no other one."""
-        line, others, q = self._line, self._every & ~moved, _each(moved)
-        most = np.abs(line.by_state(q) * steps_along(line.state, q)[:, None]).max(axis=0)
-        far = anywhere(line.state, SIZE) * others
-        change = np.abs(line.by_state(far)[0] * steps_along(line.state, far)[0])
-        return bool((change <= OUTSIDE * most).all())
-
-
-def _each(moved: np.ndarray) -> Floats:
-    """(D, N+1, 5) movements of one unknown each."""
-    q = np.zeros((int(np.count_nonzero(moved)), *moved.shape))
-    q[(np.arange(len(q)), *np.nonzero(moved))] = 1.0
-    return q
-
-
-# Solves with the matrix of an equilibrium and its transpose, to rounding of the matrix.
-
-
 class Factors:
-    """Factors of a sparse matrix.
+    """Factors of the matrix of an equilibrium, to rounding of the matrix.
 
     Each solve is corrected once by what it leaves: rows in N beside rows in m and N m would else lose three digits of
     what hardly answers.
@@ -575,8 +389,7 @@ class Factors:
     def __init__(self, matrix: sparse.csc_array) -> None:
         self._matrix, self._factors = matrix, splu(matrix)
 
-    def solve(self, right: Floats, transposed: bool = False) -> Floats:
-        """x (n, P) of A x = right, or of its transpose."""
-        matrix, kind = (self._matrix.T, "T") if transposed else (self._matrix, "N")
-        x = self._factors.solve(right, kind)
-        return np.asarray(x + self._factors.solve(right - matrix @ x, kind))
+    def solve(self, right: Floats) -> Floats:
+        """x (n, P) of A x = right."""
+        x = self._factors.solve(right)
+        return np.asarray(x + self._factors.solve(right - self._matrix @ x))

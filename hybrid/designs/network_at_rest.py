@@ -1,9 +1,8 @@
 """An equilibrium of lines, and what its results answer to numbers of the scene.
 
 At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
-each number, in place of two equilibria, or for each result where numbers are many (designs.line_at_rest).  dR/dp is the
-change of the block rows of the same state between two networks.  Lines that meet at free points move with them, and
-those at bodies turn with these.  A cable is the network of one line.
+each number, in place of two equilibria.  dR/dp is the change of the block rows of the same state between two networks.
+Lines that meet at free points move with them, and those at bodies turn with these.  A cable is the network of one line.
 
 Of a body that lines pull at with forces f at arms a, and with moments m where they are clamped,
 
@@ -23,6 +22,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -36,20 +36,19 @@ from hybrid.designs.line_at_rest import (
     Beside,
     Factors,
     Frames,
-    Gradients,
     LineAtRest,
+    at_rest_alone,
     moment_on_body,
 )
-from hybrid.designs.numbers import OfScene, at_a_bound, number_in, with_number
+from hybrid.designs.numbers import at_a_bound, number_in, number_of, step_at_rest, with_number
 from hybrid.designs.wanted import Wanted, parse_wanted
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.state.report import RADIUS, ROLLED
-from hybrid.kernels.state.state import Floats, Line
-from hybrid.linear.loaded_line import stiffness_by_water
-from hybrid.linear.matrices import linear_network
+from hybrid.kernels.state.state import Floats
+from hybrid.linear.matrices import LinearNetwork, in_last, linear_network, stiffness_by_water
 from hybrid.linear.touching import stiffness_between
 from hybrid.model.bodies import BodyModel, loads_of
 from hybrid.model.build import Model, places_of
@@ -127,7 +126,7 @@ class BodiesAtRest:
         out = np.zeros((self.count, 6))
         if self._solver.meets:
             both = zip(self._solver.lines, lines, strict=True)
-            of = [x._replace(line=smooth(y.model.line), sea=y.sea) for x, y in both]
+            of = [x._replace(line=at_rest_alone(y.model.line), sea=y.sea) for x, y in both]
             solver = NetworkSolver(of, self._points, self._numbers)
             _, _, wrench, carriers = solver.pressed_bodies(self._states)
             out[carriers] = wrench
@@ -139,27 +138,17 @@ class BodiesAtRest:
         Water around members that is another where they go, and a spring against turns that nothing holds, as Newton's
         method has it.
         """
-        first = stiffness.shape[0] - 6 * self.count
-        blocks = [sparse.csc_array((first, first))]
-        diagonal, x = np.abs(stiffness.diagonal()[first:].reshape(-1, 6)), self._solver.lines[0]
+        size, blocks, x = stiffness.shape[0], list[Floats](), self._solver.lines[0]
+        diagonal = np.abs(stiffness.diagonal()[size - 6 * self.count :].reshape(-1, 6))
         for b in range(self.count):
-            block = self._by_water(b)
+            members = self._model.bodies[b].members if b < len(self._model.bodies) else None
+            block = stiffness_by_water(self._solver, self._states, b, members)
             stiffest = float(diagonal[b, 3:].max())
             if (mine := np.flatnonzero(x.rides == b)).size:  # what touches it may roll
                 stiffest = max(stiffest, float(diagonal[b, :3].max() * x.sea.obstacles[mine, RADIUS].max() ** 2))
             block[3:, 3:] += SOFTEST * (stiffest or 1.0) * np.eye(3)
-            blocks.append(sparse.csc_array(block))
-        return sparse.csc_array(sparse.block_diag(blocks, format="csc"))
-
-    def _by_water(self, b: int) -> Floats:
-        """(6, 6) stiffness of the water around the members of a body; zeros: it has none."""
-        members = self._model.bodies[b].members if b < len(self._model.bodies) else None
-        return np.zeros((6, 6)) if members is None else stiffness_by_water(self._solver, self._states, b, members)
-
-
-def smooth(line: Line) -> Line:
-    """A line without what does not act at rest, or depends on the way there."""
-    return line._replace(bits=line.bits & ~LEFT_OUT)
+            blocks.append(block)
+        return sparse.csc_array(in_last(size, blocks))
 
 
 def with_bodies(model: NetworkModel, system: Network) -> NetworkModel:
@@ -283,12 +272,6 @@ Places = Mapping[str, tuple[float, ...]]
 NO_PLACES: Places = MappingProxyType({})
 
 
-def _with_lines_of(solver: NetworkSolver, models: Sequence[Model]) -> NetworkSolver:
-    """The solver of an equilibrium, with the lines of models."""
-    joined = [x._replace(line=model.line) for x, model in zip(solver.lines, models, strict=True)]
-    return NetworkSolver(joined, len(solver.net), solver.bodies)
-
-
 class _Changed(NamedTuple):
     """A scene with another number: its lines, arms (L, 2, 3) m of their ends at bodies, what acts on these (B, 6)."""
 
@@ -297,7 +280,7 @@ class _Changed(NamedTuple):
     own: Floats
 
 
-class NetworkAtRest(OfScene):
+class NetworkAtRest:
     """The equilibrium on one mesh, its factors, and the values of results."""
 
     def __init__(self, scene: Scene, resolution: NetworkResolution, run: Run, wanted: Sequence[Wanted]) -> None:
@@ -309,14 +292,15 @@ class NetworkAtRest(OfScene):
         self.places = {name: places_of(model, self._scenes[name]) for name, model in of_lines}
         placed = {k: replace(x, places=self.places[k], parts=1) for k, x in resolution.lines.items()}
         self._resolution = replace(resolution, lines=placed)
-        solver = _with_lines_of(run.found.solver, run.model.models)
+        found = run.found.solver
+        joined = [x._replace(line=model.line) for x, model in zip(found.lines, run.model.models, strict=True)]
+        solver = NetworkSolver(joined, len(found.net), found.bodies)
         self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in solver.lines]
         called = dict(zip(scene.asked_lines, self._names, strict=True))
         own = [[k for k, x in enumerate(wanted) if called[x.line] == name] for name in self._names]
         self._order = [k for of_line in own for k in of_line]
         self._bodies = BodiesAtRest(solver, run.state, run.model)
-        self._network = linear_network(solver, run.state, self._names, sticks=False, quick=False)
-        self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
+        self._solver, self._states = solver, run.state
         self.lines = [
             LineAtRest(
                 self._scenes[name], run.model.models[l], run.state.lines[l], [wanted[k] for k in own[l]], self._free[l],
@@ -325,30 +309,38 @@ class NetworkAtRest(OfScene):
             for l, name in enumerate(self._names)
         ]  # fmt: skip
         self.contact = self._contact(run.found, run.state, wanted)
-        self._matrix = self._stiffness()
-        self._factors = Factors(self._matrix)
         self._here = self._arms(run.model), self._loads(run.model, [x.here for x in self.lines])
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
-        self.gradients = {l: Gradients(x, self._bodies.turns(l)) for l, x in enumerate(self.lines) if x.wanted}
 
-    @classmethod
-    def of_scene(cls, asked: Scene, of: Sequence[str], cells: float, places: Places) -> NetworkAtRest:
-        """The equilibrium of a scene; arguments and errors: as of `sensitivity.at_rest`."""
-        wanted = [parse_wanted(asked, x, moves=False) for x in of]
-        scene, resolution = first_at_rest(asked.without_friction())
-        refuse_use(scene.written, "derivatives", given="hybrid sensitivity")
-        finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
-        resolution = replace(resolution, lines=finely)
-        with scene.form.in_words():
-            run = static_system(scene, None, lambda: scene_text(scene), resolution=resolution)
-        return cls(scene, resolution, run, wanted)
+    @property
+    def shapes(self) -> dict[str, Floats]:
+        """Places (N+1, 3) of the nodes of every line, m."""
+        return {name: line.state.r.copy() for name, line in zip(self.scene.asked_lines, self.lines, strict=True)}
 
-    def _stiffness(self) -> sparse.csc_array:
-        """The matrix of all unknowns, with what contact and bodies add to that of the lines."""
+    def number(self, key: str) -> float:
+        """The value of a key of the scene."""
+        return number_of(self.scene, key)
+
+    @cached_property
+    def _network(self) -> LinearNetwork:
+        return linear_network(self._solver, self._states, self._names, sticks=False, quick=False)
+
+    @cached_property
+    def _matrix(self) -> sparse.csc_array:
+        """Of all unknowns, with what contact and bodies add to that of the lines."""
         A = sparse.csc_array(self._network.stiffness + self._network.skew)
         if self.contact is not None:
             A = A + self._of_unknowns(self.contact.stiffness)
         return A + self._bodies.stiffness_besides(A) if self._bodies.count else A
+
+    @cached_property
+    def _factors(self) -> Factors:
+        return Factors(self._matrix)
+
+    @property
+    def _first_body(self) -> int:
+        """The first of the unknowns that are of bodies."""
+        return self._network.size - 6 * self._bodies.count
 
     def _loads(self, model: NetworkModel, lines: Sequence[Beside]) -> Floats:
         """(B, 6) N, N m, on bodies but for the forces of their lines; ValueError: the model has other members."""
@@ -388,7 +380,8 @@ class NetworkAtRest(OfScene):
         """(P, W) derivatives of all results by numbers."""
         if not keys:
             return np.zeros((0, self.values.size))
-        numbers, steps = self.numbers_and_steps(keys)
+        numbers = np.array([self.number(key) for key in keys])
+        steps = np.array([step_at_rest(self.scene, *x) for x in zip(keys, numbers.tolist(), strict=True)])
         network, rights, shifts, reports = self._network, [], [], []
         every = [x for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True) for x in self._beside(*row)]
         on_bodies = _slope([x.own for x in every], steps)
@@ -414,47 +407,20 @@ class NetworkAtRest(OfScene):
         on_bodies.reshape(-1, len(keys))[:] -= touching[len(shifted) :, : len(shifted)] @ shifted
         right = np.asarray(network.place.T @ left_over)
         right[self._first_body :] += on_bodies.reshape(-1, len(keys))
-        many = all(x.pay_for(len(keys)) for x in self.gradients.values())
-        by_state = self.transposed(right, shifts) if many else self.forward(right, shifts)
-        blank = np.zeros((len(keys), 0))
-        return self._in_order(
-            [
-                x + line.by_scene(report, steps) if line.wanted else blank
-                for x, line, report in zip(by_state, self.lines, reports, strict=True)
-            ]
-        )
+        every_line, blank = zip(self.forward(right, shifts), self.lines, reports, strict=True), np.zeros((len(keys), 0))
+        return self._in_order([x + line.by_scene(y, steps) if line.wanted else blank for x, line, y in every_line])
 
     def forward(self, right: Floats, shifts: Sequence[Floats]) -> list[Floats]:
         """(P, W) of every line by a solve for each number.
 
         right: (free, P); shifts: (5 (N+1), P) of every line where it is held.
         """
-        out = []
-        for line, (moved, turns) in zip(self.lines, self.movements(right, shifts), strict=True):
-            out.append(line.by_state(moved, turns) if line.wanted else np.zeros((right.shape[1], 0)))
-        return out
-
-    def movements(self, right: Floats, shifts: Sequence[Floats]) -> list[tuple[Floats, Floats | None]]:
-        """Of every line (P, N+1, 5) of its state and (P, 2, 3) rad of its ends by numbers; None: they stay."""
-        network, count = self._network, right.shape[1]
+        network, count, out = self._network, right.shape[1], []
         free = self._factors.solve(right)
         q, turned = np.asarray(network.place @ free), free[self._first_body :].reshape(-1, 6, count)[:, 3:]
-        out = []
-        for l, shift in enumerate(shifts):
+        for l, (line, shift) in enumerate(zip(self.lines, shifts, strict=True)):
             moved = (q[network.at[l] : network.at[l + 1]] + shift).T.copy().reshape(count, -1, SIZE)
-            out.append((moved, self._turns(l, turned)))
-        return out
-
-    def transposed(self, right: Floats, shifts: Sequence[Floats]) -> list[Floats]:
-        """The same by a transposed solve for each result."""
-        network, out = self._network, [np.zeros((right.shape[1], 0)) for _ in self.lines]
-        for l, gradients in self.gradients.items():
-            by_unknowns = gradients.by_unknowns.reshape(len(self.lines[l].wanted), -1)
-            by_free = np.asarray(network.place[network.at[l] : network.at[l + 1]].T @ by_unknowns.T)
-            for k in self._bodies.turns(l):
-                turn = self._first_body + 6 * self._bodies.body_at(l, k) + 3
-                by_free[turn : turn + 3] += gradients.by_turns[:, k].T
-            out[l] = right.T @ self._factors.solve(by_free, transposed=True) + shifts[l].T @ by_unknowns.T
+            out.append(line.by_state(moved, self._turns(l, turned)) if line.wanted else np.zeros((count, 0)))
         return out
 
     def _shift(self, l: int, every: Sequence[_Changed], steps: Floats) -> Floats:
@@ -562,19 +528,19 @@ class NetworkAtRest(OfScene):
             if not anew[l]:
                 out.append(line.here)
                 continue
-            scene, frames = self._scene_of(system, name), NO_FRAMES
+            scene, first = self._scene_of(system, name), self._scenes[name]
+            seats: Floats | None = None
             if not self._bodies.turns(l):
-                model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
+                model = nearby(line.model, first, scene, self._resolution.lines[name], LEFT_OUT)
             elif by_shape:
-                model = _on_same_cells(shaped[name][0], line.model)
-                frames = self._bodies.frames(l, shaped[name][1])
+                model, seats = shaped[name]
+                model = model if same_nodes(model.line.s, line.model.line.s) else None
             else:
-                found = nearby_clamped(line.model, self._scenes[name], system, name, bodies, self._resolution, LEFT_OUT)
-                model, seats = (None, None) if found is None else found
-                frames = self._bodies.frames(l, seats) if seats is not None else NO_FRAMES
+                clamped_anew = nearby_clamped(line.model, first, system, name, bodies, self._resolution, LEFT_OUT)
+                model, seats = clamped_anew or (None, None)
             if model is None:
                 raise _other_cells(key)
-            out.append(line.beside(scene, model, frames))
+            out.append(line.beside(scene, model, NO_FRAMES if seats is None else self._bodies.frames(l, seats)))
         if system.surfaces:
             out = self._on_surfaces(system, out, (self._model if built is None else built).bodies)
         if built is None and all(x is line.here for x, line in zip(out, self.lines, strict=True)):
@@ -594,6 +560,22 @@ class NetworkAtRest(OfScene):
             x if x is line.here and _as_hard(x, new) else new
             for x, new, line in zip(lines, out, self.lines, strict=True)
         ]
+
+
+def at_rest(asked: Scene, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES) -> NetworkAtRest:
+    """The equilibrium of one cable or of several lines; of: results.
+
+    cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
+    SceneError: what has no derivative; ComputationError: there is no equilibrium.
+    """
+    wanted = [parse_wanted(asked, x, moves=False) for x in of]
+    scene, resolution = first_at_rest(asked.without_friction())
+    refuse_use(scene.written, "derivatives", given="hybrid sensitivity")
+    finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
+    resolution = replace(resolution, lines=finely)
+    with scene.form.in_words():
+        run = static_system(scene, None, lambda: scene_text(scene), resolution=resolution)
+    return NetworkAtRest(scene, resolution, run, wanted)
 
 
 def same_places(a: Model, b: Model) -> bool:
@@ -616,11 +598,6 @@ def _as_hard(x: Beside, y: Beside) -> bool:
     """Whether what two lines may touch is the same."""
     same = zip((x.sea.obstacles, x.sea.carried[:, :ROLLED]), (y.sea.obstacles, y.sea.carried[:, :ROLLED]), strict=True)
     return all(np.array_equal(a, b) for a, b in same)
-
-
-def _on_same_cells(model: Model, of: Model) -> Model | None:
-    """The model; None: its cells are others than those of another one."""
-    return model if same_nodes(model.line.s, of.line.s) else None
 
 
 def _other_cells(key: str) -> ComputationError:

@@ -9,8 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numpy as np
-
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.base import Invalid, Table, unit_of
@@ -111,30 +109,11 @@ def unit_of_key(scene: Scene, key: str) -> str:
     return unit
 
 
-class OfScene:
-    """What is computed of a scene, and differentiated by its numbers."""
-
-    scene: Scene
-    lines: Sequence[Any]  # LineAtRest, by name as in the scene
-
-    @property
-    def shapes(self) -> dict[str, Floats]:
-        """Places (N+1, 3) of the nodes of every line, m."""
-        return {name: line.state.r.copy() for name, line in zip(self.scene.asked_lines, self.lines, strict=True)}
-
-    def number(self, key: str) -> float:
-        """The value of a key of the scene."""
-        return number_of(self.scene, key)
-
-    def numbers_and_steps(self, keys: Sequence[str]) -> tuple[Floats, Floats]:
-        """(P,) values of keys, and by how much lines with more and with less of each differ from the scene."""
-        numbers = np.array([self.number(key) for key in keys])
-        return numbers, np.array([self._step(*row) for row in zip(keys, numbers.tolist(), strict=True)])
-
-    def _step(self, key: str, number: float) -> float:
-        if TOUCHED.search(key):
-            return OF_TOUCHED * (self.scene.length if PLACE.search(key) else abs(number) or 1.0)
-        return (OF_LENGTH if LENGTH.search(key) else OF_NUMBER) * (abs(number) or 1.0)
+def step_at_rest(scene: Scene, key: str, number: float) -> float:
+    """By how much lines at rest with more and with less of a number differ from the scene."""
+    if TOUCHED.search(key):
+        return OF_TOUCHED * (scene.length if PLACE.search(key) else abs(number) or 1.0)
+    return (OF_LENGTH if LENGTH.search(key) else OF_NUMBER) * (abs(number) or 1.0)
 
 
 def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:

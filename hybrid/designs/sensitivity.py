@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.designs.in_motion import WAY as BY_CELLS
 from hybrid.designs.in_motion import by_cells, in_motion, is_edge
-from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places
+from hybrid.designs.network_at_rest import NetworkAtRest, at_rest
 from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.errors import ComputationError, Outcome
 from hybrid.scene.read import SceneLike, as_scene
@@ -104,12 +104,3 @@ def way_at_rest(asked: Scene, rest: NetworkAtRest) -> str:
         rubs += [between, *(x.contact.friction for x in asked.lines.values())]
     begun = [f"lines {a} and {b} begin to touch" for a, b in contact.begins] if contact is not None else []
     return ", ".join([AT_REST, *(["friction left out"] if any(rubs) else []), *begun])
-
-
-def at_rest(asked: Scene, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES) -> NetworkAtRest:
-    """The equilibrium of one cable or of several lines; of: results.
-
-    cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
-    SceneError: what has no derivative; ComputationError: there is no equilibrium.
-    """
-    return NetworkAtRest.of_scene(asked, of, cells, places)

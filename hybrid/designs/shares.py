@@ -18,8 +18,8 @@ import numpy as np
 from scipy.stats import pearsonr
 
 from hybrid.designs.in_motion import in_motion, refuse_edges
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import AnyScene
-from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES

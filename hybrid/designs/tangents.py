@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -135,20 +136,6 @@ class Seen(NamedTuple):
     t: Floats
 
 
-def copied(batch: Batch) -> Batch:
-    parts: Any = [np.array(x) for x in batch]
-    return Batch(*parts)
-
-
-def _opposite(here: Any, more: Any) -> Any:
-    """What is as far from what is here to the other side; what has no value, or is no number, stays."""
-    if more.dtype.kind != "f" or not more.size:
-        return more
-    with np.errstate(invalid="ignore"):
-        away = here - more
-    return np.asarray(here + np.where(np.isfinite(away), away, 0.0))
-
-
 def joined(batches: Sequence[Batch]) -> Batch:
     """One after the other; what does not vary from output to output is that of the last one."""
     counts = [x.t.size for x in batches]
@@ -182,12 +169,6 @@ def line_like(model: Model, base: Model) -> Line:
 def lie_in(plane: Floats, model: Model) -> bool:
     """Whether a line lies in a plane (3, 3): its number has not moved that."""
     return model.plane is not None and bool(np.abs(model.plane - plane).max() <= SAME_PLANE)
-
-
-def refuse_what(what: Mapping[str, bool]) -> None:
-    """Unfollowed where something of this is there."""
-    if found := [text for text, there in what.items() if there]:
-        raise Unfollowed(", ".join(found))
 
 
 def unknown_of(model: Model) -> dict[str, bool]:
@@ -253,16 +234,15 @@ def books_beside(clock: Clock, outputs: Floats, done: int, cells: int, ends: End
     return books._replace(clock=clock, outputs=outputs, samples=samples)
 
 
-def parts_of_sizes(sizes: Floats) -> Floats:
-    """Parts of tangents by which they may be off, of sizes (.., TANGENT_SIZES): what the last corrections leave."""
-    sizes = np.maximum(sizes, 1e-300)
-    return np.maximum(sizes[..., LEFT_R] / sizes[..., LARGEST_R], sizes[..., LEFT_T] / sizes[..., LARGEST_T])
-
-
 def opposite(here: Batch, more: Batch) -> Batch:
-    """Outputs as far from those of the run to the other side."""
+    """Outputs as far from those of the run to the other side; what has no value, or is no number, stays."""
+    parts: list[Any] = []
     both: Any = zip(here, more, strict=True)
-    return Batch(*(_opposite(x, y) for x, y in both))
+    for x, y in both:
+        with np.errstate(invalid="ignore"):
+            away = x - y if y.dtype.kind == "f" and y.size else None
+        parts.append(y if away is None else np.asarray(x + np.where(np.isfinite(away), away, 0.0)))
+    return Batch(*parts)
 
 
 def same_waves(one: Sea, other: Sea) -> bool:
@@ -358,9 +338,9 @@ class NetworkOthers:
         for l, line in enumerate(run.lines):
             state, ends, sea = run.state.lines[l], self._ends(run.solver.lines[l], run.state.lines[l]), line.model.sea
             self._base[l].append(
-                copied(batch_of_one(0.0, ends, state, line.books.report[0], np.zeros(len(POWERS)), sea.at_time(0.0)))
+                deepcopy(batch_of_one(0.0, ends, state, line.books.report[0], np.zeros(len(POWERS)), sea.at_time(0.0)))
             )
-            line.shown = lambda batch, l=l: self._base[l].append(copied(batch))
+            line.shown = lambda batch, l=l: self._base[l].append(deepcopy(batch))
 
     def _other(self, model: NetworkModel, k: int, h: float) -> _Other:
         base = self._model
@@ -551,7 +531,9 @@ class NetworkOthers:
     @property
     def errors(self) -> Floats:
         """(P,) parts of tangents by which they may be off: what the last corrections leave of them."""
-        return np.asarray(parts_of_sizes(self.sizes).max(axis=1))
+        sizes = np.maximum(self.sizes, 1e-300)
+        left = np.maximum(sizes[..., LEFT_R] / sizes[..., LARGEST_R], sizes[..., LEFT_T] / sizes[..., LARGEST_T])
+        return np.asarray(left.max(axis=1))
 
     # --- what is found ----------------------------------------------------------------------------------
 
@@ -607,20 +589,19 @@ def refuse_system(run: Run) -> None:
     for x in model.models:
         what |= {text: there or what.get(text, False) for text, there in unknown_of(x).items()}
     what["loads change in the run"] |= bool(model.breaks)
-    found = run.found
-    refuse_what(
-        what
-        | {
-            "lines start as they are placed": found is None and len(model.body_places) > 0,
-            "lines touch each other": (found is not None and found.settled) or run.solver.shared is not None,
-            "zones move": any(x.manager is not None for x in run.lines),
-            "line is paid out": any(x.paying is not None for x in run.lines),
-            "connections may break": bool(weaknesses(run.network)),
-            "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
-            "a body has a shape": bool(model.rides.size),
-            "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),
-            "some lines lie in planes": len({x.line.bits & PLANAR for x in model.models}) > 1,
-            "bodies turn at first": bool(run.state.bodies[:, W : W + 3].any()),
-            "steps follow errors": run.loop.controlled,
-        }
-    )
+    rest = run.found
+    what |= {
+        "lines start as they are placed": rest is None and len(model.body_places) > 0,
+        "lines touch each other": (rest is not None and rest.settled) or run.solver.shared is not None,
+        "zones move": any(x.manager is not None for x in run.lines),
+        "line is paid out": any(x.paying is not None for x in run.lines),
+        "connections may break": bool(weaknesses(run.network)),
+        "a line is clamped to what turns with it": bool(model.seats[:, :, TURNS].any()),
+        "a body has a shape": bool(model.rides.size),
+        "a body has members": bool((run.solver.bodies[:, PIECES] > 0.0).any()),
+        "some lines lie in planes": len({x.line.bits & PLANAR for x in model.models}) > 1,
+        "bodies turn at first": bool(run.state.bodies[:, W : W + 3].any()),
+        "steps follow errors": run.loop.controlled,
+    }
+    if unknown := [text for text, found in what.items() if found]:
+        raise Unfollowed(", ".join(unknown))

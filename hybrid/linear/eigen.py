@@ -62,7 +62,7 @@ def lowest_modes(network: LinearNetwork, count: int, near: float | None = None) 
     squares, vectors = _proved(A, M, shift, wanted)
     order = np.argsort(squares)
     squares, vectors = squares[order], vectors[:, order]
-    missed = _missed(network, squares) if near is None else _missed_between(network, squares)
+    missed = _missed(network, squares, near is not None)
     chosen = np.arange(count)
     if near is not None:
         away = np.abs(np.sqrt(np.maximum(squares, 0.0)) - near)
@@ -204,20 +204,15 @@ def _below(network: LinearNetwork, square: float) -> int | None:
     return int((factors.U.diagonal() < 0.0).sum()) - int((network.tensions > 0.0).sum())
 
 
-def _missed(network: LinearNetwork, squares: Floats) -> int | None:
-    """Modes below a gap near the largest w^2 found, less those found there."""
-    gap = _gap_above(squares, 1)
-    below = _below(network, gap) if gap is not None else None
-    return None if below is None or gap is None else below - int((squares < gap).sum())
-
-
-def _missed_between(network: LinearNetwork, squares: Floats) -> int | None:
-    """Modes between two gaps, less those found there."""
-    high = _gap_above(squares, 2)
-    low = None if high is None else -(_gap_above(-squares[::-1], 2) or np.inf)
-    if high is None or low is None or not np.isfinite(low) or not low < high:
+def _missed(network: LinearNetwork, squares: Floats, between: bool) -> int | None:
+    """Modes below a gap near the largest w^2 found, less those found there; between: above one near the least, too."""
+    high, low = _gap_above(squares, 1 + between), None
+    if between:
+        low = _gap_above(-squares[::-1], 2)
+        low = None if low is None else -low
+    if high is None or (between and (low is None or not low < high)):
         return None
-    above, under = _below(network, high), _below(network, low)
+    above, under = _below(network, high), 0 if low is None else _below(network, low)
     if above is None or under is None:
         return None
-    return above - under - int(((squares > low) & (squares < high)).sum())
+    return above - under - int(((squares > (-np.inf if low is None else low)) & (squares < high)).sum())

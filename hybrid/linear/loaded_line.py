@@ -16,29 +16,19 @@ import numpy as np
 from scipy import sparse
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, OWN, PLACE, V
+from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.laws.closed_forms import FADED
-from hybrid.kernels.laws.water import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET, wave_kinematics
+from hybrid.kernels.laws.water import ALONG, CM, CN, CT, MIDDLE, PUSH, WATER, WET, wave_kinematics
 from hybrid.kernels.state.report import BODIES, DRAG, FLOW, SURFACE, WAVES
 from hybrid.kernels.state.state import LANES, RIDES, Floats, Line, Sea, State
-from hybrid.linear.matrices import (
-    ANCHOR,
-    SHIFT,
-    TURN,
-    LinearLine,
-    RestMarch,
-    by_turn,
-    rotation,
-    rows_at_rest,
-    sparse_rows,
-)
+from hybrid.linear.matrices import ANCHOR, LinearLine, LinearNetwork, RestMarch, by_turn, rows_at_rest, sparse_rows
 from hybrid.linear.response_results import LineResponse, axes_across, linear_law, of_cylinders, phases_of
+from hybrid.linear.touching import Rest
 from hybrid.model.bodies import Members
 from hybrid.model.build import Model
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
-from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.stepper import JoinedLine, NetworkState
+from hybrid.solve.stepper import JoinedLine
 
 # The block rows of a line at rest in a sea.
 RowsOf = Callable[[Sea], Floats]
@@ -111,8 +101,9 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
             if line.bits & WAVES:
                 if still is None:
                     still = _in_sea(there.still(), state, rows_of)
-                by_wave, speed = _of_wave(there, state, wave, rows_of, still)
-                forces, water = forces + size * by_wave, water + size * speed
+                in_seas = [still, *(_in_sea(x, state, rows_of) for x in there.waves(wave))]
+                both = size * _amplitudes(in_seas, wave)
+                forces, water = forces + both[:, :3], water + both[:, 3:]
             for k in (0, 1):
                 if moves.follows[k]:
                     place = moves.position[k]
@@ -129,15 +120,6 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
                 shifts[end] += np.cross(turn, arm)
         out.append(Excitation(float(omega), forces, water, shifts, turns))
     return out
-
-
-def _of_wave(there: SmallSea, state: State, wave: Floats, rows_of: RowsOf, still: Floats) -> tuple[Floats, Floats]:
-    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a unit wave.
-
-    Of amplitude 1 m and phase 0; still: both (N+1, 6) without waves.
-    """
-    both = _amplitudes([still, *(_in_sea(sea, state, rows_of) for sea in there.waves(wave))], wave)
-    return both[:, :3], both[:, 3:]
 
 
 def _in_sea(there: Sea, state: State, rows_of: RowsOf) -> Floats:
@@ -179,18 +161,14 @@ class SmallSea:
         """With the cosine, then with the sine of a wave (6,) that is small."""
         for phase in (0.0, -0.5 * np.pi):
             self.sea.waves[0] = wave
-            self.sea.waves[0, [0, 4]] = _small(wave), phase
+            self.sea.waves[0, [0, 4]] = SMALL_WAVE * 2.0 * np.pi / wave[5], phase
             self.sea.orbits[0] = self.sea.waves[0, 0] * self.sea.waves[0, 1]
             yield self.sea
 
 
-def _small(wave: Floats) -> float:
-    return float(SMALL_WAVE * 2.0 * np.pi / wave[5])
-
-
 def _amplitudes(found: list[Floats], wave: Floats) -> Floats:
     """Complex amplitudes by a wave of 1 m, of what was found in each of its seas."""
-    return np.asarray(((found[1] - found[0]) + 1j * (found[2] - found[0])) / _small(wave))
+    return np.asarray(((found[1] - found[0]) + 1j * (found[2] - found[0])) / (SMALL_WAVE * 2.0 * np.pi / wave[5]))
 
 
 def half_cells(line: Line, sea: Sea, state: State) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:
@@ -223,6 +201,12 @@ STRAIGHT = 1e-9  # 1/m: less is no bend
 AWRY = (0.3, 0.9, 0.4)  # along no axis
 
 
+def loaded_lines(rest: Rest, network: LinearNetwork, omegas: Floats) -> list[LoadedLine]:
+    """All lines of a network at rest."""
+    each = zip(rest.solver.lines, network.lines, rest.models, strict=True)
+    return [LoadedLine(x, linear, model, omegas) for x, linear, model in each]
+
+
 class LoadedLine:
     """One line, its drag, and what excites it."""
 
@@ -231,7 +215,8 @@ class LoadedLine:
         self.line, state, self.sea = linear.line, linear.state, model.sea.at_time(np.inf)
         self.obstacles = model.sea.names
         self.carried: dict[int, Floats] = {}  # (F, N+1, 3) m, motions of obstacles that bodies carry, at the nodes
-        count, calm = self.line.s.size, _without_drag(self.line)
+        count = self.line.s.size
+        calm = self.line._replace(bits=self.line.bits & ~DRAG, point_drag=0.0 * self.line.point_drag)
 
         rows = np.zeros((count, SIZE * WIDTH))
         march = RestMarch(calm._replace(bits=calm.bits | WAVES), x.ends, state, rows)
@@ -438,10 +423,6 @@ class LoadedLine:
         size[nodes] -= end * parts
 
 
-def _without_drag(line: Line) -> Line:
-    return line._replace(bits=line.bits & ~DRAG, point_drag=0.0 * line.point_drag)
-
-
 # Morison members of a free body about rest in the sea: what waves do to the body, and linear drag of its pieces.
 #
 # A piece at an arm a from the origin moves by  T q,  T = [1, -[a]x],  of the shifts and turns q of its body.  With the
@@ -548,25 +529,3 @@ def turning_doubts(name: str, q: Floats) -> Iterator[str]:
     turn = math.sqrt(0.5 * float((np.abs(q[:, 3:]) ** 2).sum()))
     if turn > LARGE_TURN:
         yield f"body {name} turns by {turn:.2g} rad (standard deviation)"
-
-
-def stiffness_by_water(solver: NetworkSolver, states: NetworkState, b: int, members: Members) -> Floats:
-    """(6, 6) stiffness of the water around the members of body b, which is another where it shifts and turns."""
-    K, step, numbers = np.zeros((6, 6)), np.repeat([SHIFT * solver.length, TURN], 3), solver.bodies.copy()
-    pieces = slice(NUMBERS, NUMBERS + PIECE * len(members.pieces))
-    for k in range(6):
-        for sign in (1.0, -1.0):
-            moved = states.copy()
-            if k < 3:
-                moved.bodies[b, PLACE + k] += sign * step[k]
-            else:
-                frame = moved.bodies[b, FRAME:V].reshape(3, 3)
-                moved.bodies[b, FRAME:V] = (rotation(sign * step[k] * np.eye(3)[k - 3]) @ frame).ravel()
-            solver.evaluate_forces(moved, 0.0)
-            before = solver.body_work[b, OWN : OWN + 6].copy()
-            members.update_water(np.inf, moved.bodies[b], 0.0, solver.bodies[b, pieces].reshape(-1, PIECE))
-            solver.evaluate_forces(moved, 0.0)
-            K[:, k] -= sign * (solver.body_work[b, OWN : OWN + 6] - before) / (2.0 * step[k])
-            solver.bodies[:] = numbers
-    solver.evaluate_forces(states, 0.0)
-    return K

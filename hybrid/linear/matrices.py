@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -49,12 +48,14 @@ from hybrid.kernels.laws.bending_law import (
 from hybrid.kernels.laws.bending_law import PER_TENSION as SLIP_PER_TENSION
 from hybrid.kernels.laws.soil import BRANCH, DEPTH, PRESSES, TURN_P, UP, rest_in_soil
 from hybrid.kernels.laws.soil import TURN as TURN_DEPTH
+from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.run import entry
 from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, MOMENT_A, PLANAR, ROTARY, SOIL, WAVES
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, Work, no_torsion
 from hybrid.kernels.step.step import friction_axes
-from hybrid.linear.touching import TouchingLines, TouchingParts, touching_parts
+from hybrid.linear.touching import Blocks, TouchingLines, TouchingParts, hats, touching_parts
+from hybrid.model.bodies import Members
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
 from hybrid.solve.stepper import JoinedLine, NetworkState
@@ -221,22 +222,6 @@ class LinearNetwork:
         return out
 
 
-class _Entries:
-    """Numbers of a sparse matrix with their rows and columns, one after the other; those of one place are added."""
-
-    def __init__(self) -> None:
-        self._parts: list[tuple[Any, Any, Any]] = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0))]
-
-    def add(self, row: Any, column: Any, value: Any) -> None:
-        """One, or as many as the arrays have."""
-        self._parts.append((row, column, value))
-
-    def matrix(self, rows: int, columns: int) -> sparse.csr_array:
-        """The matrix of this shape."""
-        i, j, values = (np.concatenate([np.atleast_1d(x[k]) for x in self._parts]) for k in range(3))
-        return sparse.csr_array((values, (i, j)), shape=(rows, columns))
-
-
 def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: bool = True) -> LinearLine:
     """A line about an equilibrium, with ends that are joined as if they were free: the network holds them.
 
@@ -392,14 +377,12 @@ def _by_length(K: sparse.csr_array) -> sparse.csr_array:
 
 def _through_zones(line: Line) -> sparse.csr_array:
     """How catenary zones that a torque passes through join the twist of the rods beside them."""
-    size = SIZE * line.s.size
-    entries = _Entries()
+    size, out = SIZE * line.s.size, Blocks()
     for first, after, compliance, _, _ in line.torsion:
         rods = [int(c) for c in (first - 1, after) if 0 <= c < line.h.size and line.spin[int(c)]]
-        for a in rods:
-            for b in rods:
-                entries.add(SIZE * a + 4, SIZE * b + 4, (1.0 if a == b else -1.0) / compliance)
-    return entries.matrix(size, size)
+        twists = SIZE * np.array(rods, int) + 4
+        out.add(twists, twists, (2.0 * np.eye(len(rods)) - 1.0) / compliance)
+    return out.matrix(size, size)
 
 
 def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tuple[Floats, Floats]:
@@ -426,12 +409,8 @@ def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tupl
 
 def rotation(n: Floats) -> Floats:
     """exp([n]x) of a small rotation vector, to the fourth order."""
-    S = _hat(n)
+    S = hats(n)
     return np.asarray(np.eye(3) + S + S @ S / 2.0 + S @ S @ S / 6.0)
-
-
-def _hat(a: Floats) -> Floats:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def linear_network(
@@ -459,12 +438,11 @@ def linear_network(
     A = sparse.block_diag([x.stiffness for x in lines], format="csr")
     M = sparse.block_diag([x.mass for x in lines], format="csr")
     standing = sparse.block_diag([x.standing for x in lines], format="csr")
-    bodies_alone = _masses(solver, states, own + 3 * points, size)
-    bodies_alone = bodies_alone + whole.T @ parts.mass @ whole
+    bodies_alone = in_last(size, in_inertial_axes(solver, states, MASS)) + whole.T @ parts.mass @ whole
     M, apart = (sparse.csr_array(place.T @ each @ place) + bodies_alone for each in (M, standing))
     A = sparse.csr_array(place.T @ A @ place) + _couplings(coupling, at, place, own + 3 * points)
     A = A + whole.T @ parts.stiffness @ whole
-    A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
+    A = A + in_last(size, [_own_stiffness(solver, states, b, extra) for b in range(bodies)])
     pull = max(float(np.abs(x.state.T).max()) for x in lines)
     layers = sparse.csr_array(place.T @ sparse.block_diag([x.by_layers for x in lines], format="csr") @ place)
     slow = solver.anchor / STATIC_ANCHOR * max(pull / solver.scale, 1.0)
@@ -490,7 +468,7 @@ def _joined(
     of the line) by turns of the frame.
     """
     of_lines, own, size = sizes
-    points, entries, column = len(solver.net), _Entries(), 0
+    points, out, column = len(solver.net), Blocks(), 0
     extra: list[tuple[int, Floats]] = []
     coupling: list[tuple[int, int, Floats]] = []
     for l, (x, joined) in enumerate(zip(lines, solver.lines, strict=True)):
@@ -502,26 +480,20 @@ def _joined(
             free[-k, 1:4] = False
             rows = at[l] + SIZE * (k * (count - 1)) + 1 + np.arange(3)
             if joint < points:
-                for c in range(3):
-                    entries.add(rows[c], own + 3 * joint + c, 1.0)
+                out.add(rows, own + 3 * joint + np.arange(3), np.eye(3))
                 continue
             b = joint - points
-            first = own + 3 * points + 6 * b
             arm = states.bodies[b, FRAME:V].reshape(3, 3) @ joined.fairleads[k]
-            shifted = -_hat(arm)
-            for c in range(3):
-                entries.add(rows[c], first + c, 1.0)
-                for d in range(3):
-                    entries.add(rows[c], first + 3 + d, shifted[c, d])
+            out.add(rows, own + 3 * points + 6 * b + np.arange(6), np.hstack([np.eye(3), -hats(arm)]))
             f = x.net[k] + forces[(at[l] if k == 0 else at[l + 1] - SIZE) // SIZE]
-            extra.append((b, x.held_moment[k] - _hat(f) @ _hat(arm)))
+            extra.append((b, x.held_moment[k] - hats(f) @ hats(arm)))
             if x.turned[k].any():
                 coupling.append((l, b, x.turned[k]))
         own_rows = at[l] + np.flatnonzero(free.ravel())
-        entries.add(own_rows, np.arange(column, column + own_rows.size), np.ones(own_rows.size))
+        out.add(own_rows[:, None], np.arange(column, column + own_rows.size)[:, None], np.ones((own_rows.size, 1, 1)))
         column += own_rows.size
     assert column == of_lines, (column, of_lines)
-    return entries.matrix(int(at[-1]), size), extra, coupling
+    return out.matrix(int(at[-1]), size), extra, coupling
 
 
 def _lent(lines: Sequence[LinearLine], solver: NetworkSolver) -> Floats:
@@ -540,63 +512,70 @@ def _couplings(
 ) -> sparse.csr_array:
     """How turns of bodies turn the frames of ends, and these push nodes and twist cells: both ways."""
     size = place.shape[1]
-    out = sparse.csr_array((size, size))
+    out = Blocks()
     for l, b, forces in given:
-        whole = np.zeros((place.shape[0], 3))
-        whole[at[l] : at[l + 1]] = forces.T
-        forces_on = place.T @ whole  # (q, 3): forces on q that hold it while the frame turns
-        rows = np.flatnonzero(forces_on.any(axis=1))
-        columns = first + 6 * b + 3 + np.arange(3)
-        block = sparse.csr_array(
-            (forces_on[rows].ravel(), (np.repeat(rows, 3), np.tile(columns, rows.size))), shape=(size, size)
-        )
-        out = out + block + block.T
-    return out
+        forces_on = place[at[l] : at[l + 1]].T @ forces.T  # (q, 3): forces on q that hold it while the frame turns
+        rows, columns = np.flatnonzero(forces_on.any(axis=1)), first + 6 * b + 3 + np.arange(3)
+        out.add(rows, columns, forces_on[rows])
+        out.add(columns, rows, forces_on[rows].T)
+    return out.matrix(size, size)
 
 
-def _masses(solver: NetworkSolver, states: NetworkState, first: int, size: int) -> sparse.csr_array:
-    """Mass and added mass of bodies, in inertial axes."""
-    entries = _Entries()
-    for b, (row, state) in enumerate(zip(solver.bodies, states.bodies, strict=True)):
-        R = np.kron(np.eye(2), state[FRAME:V].reshape(3, 3))
-        m = R @ row[MASS : MASS + 36].reshape(6, 6) @ R.T
-        for c, d in zip(*np.nonzero(m), strict=True):
-            entries.add(first + 6 * b + c, first + 6 * b + d, m[c, d])
-    return entries.matrix(size, size)
+def in_inertial_axes(solver: NetworkSolver, states: NetworkState, of: int) -> list[Floats]:
+    """Matrices (6, 6) of bodies, those that begin at a column of their numbers."""
+    axes = [np.kron(np.eye(2), state[FRAME:V].reshape(3, 3)) for state in states.bodies]
+    return [R @ row[of : of + 36].reshape(6, 6) @ R.T for R, row in zip(axes, solver.bodies, strict=True)]
 
 
-def _of_bodies(
-    solver: NetworkSolver, states: NetworkState, extra: Sequence[tuple[int, Floats]], first: int, size: int
-) -> sparse.csr_array:
-    """Stiffness of bodies: of their weight and the water, and of forces of lines that turn with their arms."""
-    entries = _Entries()
-    for b in range(len(solver.bodies)):
-        K = _own_stiffness(solver, states, b)
-        for other, stiffness in extra:
-            if other == b:
-                K[3:, 3:] += stiffness
-        for c, d in zip(*np.nonzero(K), strict=True):
-            entries.add(first + 6 * b + c, first + 6 * b + d, K[c, d])
-    return entries.matrix(size, size)
+def in_last(size: int, blocks: Sequence[Floats]) -> sparse.csr_array:
+    """(q, q) of matrices (6, 6) of all bodies, which are the last of q."""
+    out, at = Blocks(), size + 6 * (np.arange(len(blocks))[:, None] - len(blocks)) + np.arange(6)
+    out.add(at, at, np.reshape(blocks, (-1, 6, 6)))
+    return out.matrix(size, size)
 
 
-def _own_stiffness(solver: NetworkSolver, states: NetworkState, b: int) -> Floats:
-    """(6, 6) of the weight of a body and of the water on it, against shifts and turns (inertial), by differences."""
-    K, row = np.zeros((6, 6)), states.bodies[b]
-    if not solver.bodies[b, 36:NUMBERS].any() and solver.bodies[b, PIECES] == 0:
-        return K  # a point at which lines are clamped
-    shift = SHIFT * solver.length
+def _own_stiffness(solver: NetworkSolver, states: NetworkState, b: int, extra: Sequence[tuple[int, Floats]]) -> Floats:
+    """(6, 6) of the weight of a body, of the water on it, and of forces of lines that turn with their arms."""
+    K = np.zeros((6, 6))
+    if solver.bodies[b, 36:NUMBERS].any() or solver.bodies[b, PIECES] != 0:  # else lines are clamped to a point
+        K = _by_moving(solver, states, b, lambda _: solver.body_work[b, OWN : OWN + 6].copy())
+    for stiffness in (x for other, x in extra if other == b):
+        K[3:, 3:] += stiffness
+    return K
+
+
+def stiffness_by_water(solver: NetworkSolver, states: NetworkState, b: int, members: Members | None) -> Floats:
+    """(6, 6) stiffness of the water around the members of body b, which is another where it shifts and turns."""
+    if members is None:
+        return np.zeros((6, 6))
+    numbers, pieces = solver.bodies.copy(), slice(NUMBERS, NUMBERS + PIECE * len(members.pieces))
+
+    def change(moved: NetworkState) -> Floats:
+        before = solver.body_work[b, OWN : OWN + 6].copy()
+        members.update_water(np.inf, moved.bodies[b], 0.0, solver.bodies[b, pieces].reshape(-1, PIECE))
+        solver.evaluate_forces(moved, 0.0)
+        solver.bodies[:] = numbers
+        return np.asarray(solver.body_work[b, OWN : OWN + 6] - before)
+
+    return _by_moving(solver, states, b, change)
+
+
+def _by_moving(solver: NetworkSolver, states: NetworkState, b: int, force: Callable[[NetworkState], Floats]) -> Floats:
+    """(6, 6) by which a force (6,) of a body falls with its shifts and turns (inertial), by differences.
+
+    force: of states whose forces have been evaluated.
+    """
+    K, step = np.zeros((6, 6)), np.repeat([SHIFT * solver.length, TURN], 3)
     for k in range(6):
         for sign in (1.0, -1.0):
             moved = states.copy()
             if k < 3:
-                moved.bodies[b, PLACE + k] += sign * shift
+                moved.bodies[b, PLACE + k] += sign * step[k]
             else:
-                R = rotation(sign * TURN * np.eye(3)[k - 3]) @ row[FRAME:V].reshape(3, 3)
-                moved.bodies[b, FRAME:V] = R.ravel()
+                frame = moved.bodies[b, FRAME:V].reshape(3, 3)
+                moved.bodies[b, FRAME:V] = (rotation(sign * step[k] * np.eye(3)[k - 3]) @ frame).ravel()
             solver.evaluate_forces(moved, 0.0)
-            own = solver.body_work[b, OWN : OWN + 6]
-            K[:, k] -= sign * own / (2.0 * (shift if k < 3 else TURN))
+            K[:, k] -= sign * force(moved) / (2.0 * step[k])
     solver.evaluate_forces(states, 0.0)
     return K
 

@@ -101,7 +101,7 @@ class TouchingParts:
 
 
 @dataclass
-class _Parts:
+class Blocks:
     """Blocks of a matrix, with their rows and columns."""
 
     rows: list[Any] = field(default_factory=lambda: [np.zeros(0, np.int64)])
@@ -116,9 +116,11 @@ class _Parts:
         self.values.append(np.ravel(block))
 
     def matrix(self, rows: int, columns: int) -> sparse.csr_array:
-        """The matrix of this shape; what stands in one place is added."""
+        """The matrix of this shape, without zeros; what stands in one place is added."""
         entries = np.concatenate(self.values), (np.concatenate(self.rows), np.concatenate(self.columns))
-        return sparse.csr_array(sparse.coo_array(entries, shape=(rows, columns)))
+        found = sparse.csr_array(entries, shape=(rows, columns))
+        found.eliminate_zeros()
+        return found
 
 
 def places_of(nodes: Any) -> np.ndarray:
@@ -129,7 +131,7 @@ def places_of(nodes: Any) -> np.ndarray:
 def stiffness_between(contact: Contact, node_of: np.ndarray, size: int) -> sparse.csr_array:
     """(size, size) N/m of contact of lines as it was looked at last; node_of: (N+1,) its nodes among those of all."""
     nodes, second = contact_stiffness(contact)
-    at, parts = places_of(node_of[nodes]).reshape(-1, 18), _Parts()
+    at, parts = places_of(node_of[nodes]).reshape(-1, 18), Blocks()
     parts.add(at, at, second)
     return parts.matrix(size, size)
 
@@ -145,7 +147,7 @@ def touching_parts(
     sheaves = [k for k in _sheaves(solver) if sticks and any(x[:, k].any() for x in pressed)]
     first = bodies + 6 * len(solver.bodies)  # of the sheaves
     size = first + len(sheaves)
-    K, M, C, forces, touches = _Parts(), _Parts(), _Parts(), np.zeros((int(begins[-1]), 3)), list[Touch]()
+    K, M, C, forces, touches = Blocks(), Blocks(), Blocks(), np.zeros((int(begins[-1]), 3)), list[Touch]()
     if solver.meets:
         smooth = 0 if sticks else FRICTION
         of = [x._replace(line=x.line._replace(bits=x.line.bits & ~smooth)) for x in solver.lines]
@@ -199,7 +201,7 @@ def _pressed(x: JoinedLine, state: State) -> Floats:
 
 
 def _add_bodies(
-    out: _Parts, solver: NetworkSolver, states: NetworkState, cv: float, begins: np.ndarray, part: float = 1.0
+    out: Blocks, solver: NetworkSolver, states: NetworkState, cv: float, begins: np.ndarray, part: float = 1.0
 ) -> None:
     """Add a part of what bodies and the nodes that touch them do to each other (kernels.junctions.body_contact)."""
     rows, own, _, carriers = solver.pressed_bodies(states, cv)
@@ -235,13 +237,13 @@ def _on_obstacles(
         if not i.size:
             continue
         n, body = pressed[i, k] / force[i, None], int(x.rides[k]) if x.rides.size else -1
-        shift, places = _Parts(), 3 * np.arange(i.size)[:, None] + np.arange(3)
+        shift, places = Blocks(), 3 * np.arange(i.size)[:, None] + np.arange(3)
         shift.add(places, places_of(begins[l] + i), np.broadcast_to(np.eye(3), (i.size, 3, 3)))
         if body >= 0:
             unknown = np.broadcast_to(bodies + 6 * body + np.arange(6), (i.size, 6))
             arms = r[i] - states.bodies[body, ORIGIN : ORIGIN + 3]
             moves = -np.broadcast_to(np.eye(3), (i.size, 3, 3))
-            shift.add(places, unknown, np.concatenate([moves, _hats(arms)], axis=2))
+            shift.add(places, unknown, np.concatenate([moves, hats(arms)], axis=2))
         if k in sheaves:
             axis = carried[k, TURNED : TURNED + 9].reshape(3, 3) @ carried[k, STILL_AXIS : STILL_AXIS + 3]
             ways = np.cross(axis, r[i] - carried[k, ENDED : ENDED + 3])
@@ -261,7 +263,7 @@ def _spring(solver: NetworkSolver, touch: Touch) -> Floats:
     return np.asarray(rows[touch.of[1], MU] * touch.force / touch.travel) if touch.travel.all() else np.zeros(0)
 
 
-def _turn(out: _Parts, touch: Touch, angle: int, spring: Floats) -> None:
+def _turn(out: Blocks, touch: Touch, angle: int, spring: Floats) -> None:
     """Add what the angle of a sheave does in the springs of friction; that of the nodes is in the matrices of lines."""
     if not spring.size or not touch.slides.shape[0]:
         return
@@ -276,26 +278,21 @@ def _turn(out: _Parts, touch: Touch, angle: int, spring: Floats) -> None:
 
 def along(n: Floats) -> sparse.csr_array:
     """(n, 3 n): parts along normals (n, 3)."""
-    out = _Parts()
+    out = Blocks()
     out.add(np.arange(len(n))[:, None], 3 * np.arange(len(n))[:, None] + np.arange(3), n[:, None, :])
     return out.matrix(len(n), 3 * len(n))
 
 
 def across(n: Floats) -> sparse.csr_array:
     """(3 n, 3 n): parts across normals (n, 3)."""
-    out, places = _Parts(), 3 * np.arange(len(n))[:, None] + np.arange(3)
+    out, places = Blocks(), 3 * np.arange(len(n))[:, None] + np.arange(3)
     out.add(places, places, np.eye(3) - n[:, :, None] * n[:, None, :])
     return out.matrix(3 * len(n), 3 * len(n))
 
 
-def _hats(a: Floats) -> Floats:
-    """(n, 3, 3) matrices of a x, of vectors (n, 3)."""
-    out = np.zeros((len(a), 3, 3))
-    for (i, j), (k, sign) in {
-        (0, 1): (2, -1), (1, 0): (2, 1), (0, 2): (1, 1), (2, 0): (1, -1), (1, 2): (0, -1), (2, 1): (0, 1)
-    }.items():  # fmt: skip
-        out[:, i, j] = sign * a[:, k]
-    return out
+def hats(a: Floats) -> Floats:
+    """(.., 3, 3) matrices of a x, of vectors (.., 3)."""
+    return np.asarray(np.cross(a[..., None, :], np.eye(3)).swapaxes(-1, -2))
 
 
 # --- lines --------------------------------------------------------------------------------------
@@ -316,7 +313,7 @@ def _of_lines(
     n, force = rows[:, NORMAL : NORMAL + 3], -rows[:, FORCE]
     np.add.at(forces, node_of[nodes], (weights * force[:, None])[:, :, None] * n[:, None, :])
     count = len(rows)
-    shift, places = _Parts(), 3 * np.arange(count)[:, None] + np.arange(3)
+    shift, places = Blocks(), 3 * np.arange(count)[:, None] + np.arange(3)
     for j in range(6):
         shift.add(places, places_of(node_of[nodes[:, j]]), weights[:, j, None, None] * np.eye(3))
     shifts = shift.matrix(3 * count, size)
@@ -343,8 +340,8 @@ def _turning(
     """
     r = np.concatenate([x.r for x in states.lines])
     spins = np.concatenate([np.append(x.line.spin != 0, False) for x in touching.solver.lines])
-    out, places = _Parts(), 3 * np.arange(len(rows))[:, None] + np.arange(3)
-    n, distance = _hats(rows[:, NORMAL : NORMAL + 3]), rows[:, DISTANCE, None, None]
+    out, places = Blocks(), 3 * np.arange(len(rows))[:, None] + np.arange(3)
+    n, distance = hats(rows[:, NORMAL : NORMAL + 3]), rows[:, DISTANCE, None, None]
     for own, other, place in ((P, Q, PLACE), (Q, P, FOOT_PLACE)):
         mine, u = rows[:, own].astype(np.int64), rows[:, place]
         wide, beside = contact.width[mine], contact.width[rows[:, other].astype(np.int64)]
@@ -354,7 +351,7 @@ def _turning(
             e = r[cell + 1] - r[cell]
             l = np.linalg.norm(e, axis=1)
             d = e / l[:, None]
-            by_shift = 0.5 * distance * part * (n @ _hats(d)) / l[:, None, None]
+            by_shift = 0.5 * distance * part * (n @ hats(d)) / l[:, None, None]
             out.add(places, places_of(cell + 1), by_shift)
             out.add(places, places_of(cell), -by_shift)
             rolls = (spins[cell] * contact.rolls[mine - 1 + j])[:, None, None]

@@ -12,7 +12,7 @@ square, found by iteration (hybrid.linear.response_results).  docs/theory.md, 21
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -30,11 +30,19 @@ from hybrid.linear.loaded_line import (
     LoadedLine,
     LoadedMembers,
     frequencies_of,
+    loaded_lines,
     refuse_motions,
-    stiffness_by_water,
     turning_doubts,
 )
-from hybrid.linear.matrices import ComplexSolver, LinearLine, LinearNetwork, linear_network
+from hybrid.linear.matrices import (
+    ComplexSolver,
+    LinearLine,
+    LinearNetwork,
+    in_inertial_axes,
+    in_last,
+    linear_network,
+    stiffness_by_water,
+)
 from hybrid.linear.response_results import LineResponse, Response
 from hybrid.linear.touching import Rest, rest_of
 from hybrid.modal.validity import closing_doubts, doubts_of, left_out, name_of, obstacle_of, touching_doubts
@@ -386,20 +394,14 @@ def _doubts(found: _ModesOnMesh, unstable: int, free: list[str], chosen: np.ndar
 
 def _meetings(asked: Scene, found: list[Mode]) -> Iterator[str]:
     """Periods of the scene that meet those of modes."""
-    for where, period in excitations(asked):
+    excited, fluid = [(where, x.period) for where, x in _harmonics(asked.written, "")], asked.environment.fluid
+    if fluid is not None and fluid.waves is not None:
+        excited.append(("environment.fluid.waves", fluid.waves.main_period))
+    for where, period in excited:
         near = [k for k, mode in enumerate(found, start=1) if abs(mode.period / period - 1.0) < MEETS]
         if near:
             names = ", ".join(f"{k} ({found[k - 1].period:.4g} s)" for k in near)
             yield f"{where} has a period of {period:.4g} s, near that of mode{'s' * (len(near) > 1)} {names}"
-
-
-def excitations(asked: Scene) -> list[tuple[str, float]]:
-    """What moves in a scene with a period: key and period, s."""
-    out = [(where, x.period) for where, x in _harmonics(asked.written, "")]
-    fluid = asked.environment.fluid
-    if fluid is not None and fluid.waves is not None:
-        out.append(("environment.fluid.waves", fluid.waves.main_period))
-    return out
 
 
 def _harmonics(value: object, where: str) -> Iterator[tuple[str, Harmonic]]:
@@ -468,22 +470,17 @@ class _Linear:
     def __init__(self, rest: Rest, omegas: Floats, sticks: bool) -> None:
         self.rest, self.omegas = rest, omegas
         self.network = linear_network(rest.solver, rest.states, rest.names, sticks, touching=rest.touching)
-        self.lines = [
-            LoadedLine(x, linear, model, omegas)
-            for x, linear, model in zip(rest.solver.lines, self.network.lines, rest.models, strict=True)
-        ]
+        self.lines = loaded_lines(rest, self.network, omegas)
         self.first = self.network.size - 6 * self.network.bodies  # of the unknowns of bodies
-        damping, stiffness = [], []
-        self.members: dict[int, LoadedMembers] = {}
-        for b, (row, state) in enumerate(zip(rest.solver.bodies, rest.states.bodies, strict=True)):
-            R = np.kron(np.eye(2), state[FRAME:V].reshape(3, 3))
-            damping.append(R @ row[DAMPING : DAMPING + 36].reshape(6, 6) @ R.T)
-            stiffness.append(np.zeros((6, 6)))
-            members = rest.floats[b].members if b < len(rest.floats) else None
-            if members is not None:
-                self.members[b] = LoadedMembers(rest.bodies[b], members, state, omegas)
-                stiffness[b] = stiffness_by_water(rest.solver, rest.states, b, members)
-        self.damping, self.by_water = damping, self._of_bodies(stiffness)
+        members = [rest.floats[b].members if b < len(rest.floats) else None for b in range(self.network.bodies)]
+        self.members = {
+            b: LoadedMembers(rest.bodies[b], x, rest.states.bodies[b], omegas)
+            for b, x in enumerate(members)
+            if x is not None
+        }
+        self.damping = in_inertial_axes(rest.solver, rest.states, DAMPING)
+        by_water = [stiffness_by_water(rest.solver, rest.states, b, x) for b, x in enumerate(members)]
+        self.by_water = in_last(self.network.size, by_water)
         self.by_touch = self.network.whole.T @ self.network.touching.damping @ self.network.whole
         dragged = bool(self.members) or any(
             x.x.joints[k] >= 0 and x.point_drag[-k] > 0.0 for x in self.lines for k in (0, 1)
@@ -493,10 +490,6 @@ class _Linear:
         self.loaded: list[LoadedLine | LoadedMembers] = [*self.lines, *self.members.values()]
         self.solver: ComplexSolver | None = None
         self.vectors = np.zeros((len(omegas), self.network.size), complex)
-
-    def _of_bodies(self, blocks: Sequence[Floats]) -> sparse.csc_array:
-        """(q, q) of matrices (6, 6) of the bodies, which are the last of q."""
-        return sparse.csc_array(sparse.block_diag([sparse.csc_array((self.first, self.first)), *blocks], format="csc"))
 
     def linearize_drag(self) -> int:
         """Iterate the linear drag, first by some of the frequencies; rounds that it took."""
@@ -524,10 +517,10 @@ class _Linear:
         P = self.network.place
         dampings = [x.full_damping() for x in self.lines]
         of_bodies = [x + self.members[b].damping() if b in self.members else x for b, x in enumerate(self.damping)]
-        C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P + self.by_touch)
-        C = C + self._of_bodies(of_bodies)
+        C = P.T @ sparse.block_diag(dampings, format="csr") @ P + self.by_touch
+        C = sparse.csc_array(C + in_last(self.network.size, of_bodies))
         if self.solver is None or not self.solver.replace(2, C):
-            stiffness = self.network.stiffness + self.network.skew + self.by_water
+            stiffness = sparse.csc_array(self.network.stiffness + self.network.skew + self.by_water)
             self.solver = ComplexSolver([stiffness, self.network.mass, C])
         right = P.T @ np.concatenate(
             [x.loads(which, damping) for x, damping in zip(self.lines, dampings, strict=True)], axis=0

@@ -96,7 +96,7 @@ def sensitivity(study: str | Path, result: str) -> list[Influence]:
                 "    try:      bounds in which every case can be computed, or a sample latin_hypercube"
             )
         bounds = json.loads(found.attrs["bounds"])
-        if done.size != _size(method, len(bounds), sample["count"]):
+        if done.size != sample["count"] * (len(bounds) + (2 if method == "saltelli" else 1)):
             raise ResultError(f"{study} crosses a design of {method} with lists of values: analyse one value at a time")
         return _of_design(method, bounds, found, values)
     return _ranked(found, values, done)
@@ -113,10 +113,6 @@ def result_of(study: str | Path, result: str) -> StudyResult:
     if done.sum() < LEAST:
         raise ResultError(f"{int(done.sum())} of {done.size} cases have a '{result}'\n    expected: {LEAST} at least")
     return StudyResult(found, values, done, json.loads(found.attrs.get("sample", "null")))
-
-
-def _size(method: str, variables: int, count: int) -> int:
-    return count * (variables + 2 if method == "saltelli" else variables + 1)
 
 
 def _of_design(method: str, bounds: dict[str, Any], found: Any, values: np.ndarray) -> list[Influence]:
@@ -231,11 +227,13 @@ def cases_of(study: Study) -> Cases:
     rows = _chosen(study, [{short[name]: value for name, value in row.items()} for row in rows])
     if not rows:
         raise SceneError([Complaint("only_if", str(study.only_if), "a condition that some case fulfils", "relax it")])
-    _check_keys(text, study.scene, keys, rows[0])
+    settings = [f"{path}={json.dumps(rows[0][name])}" for name, paths in keys.items() for path in paths]
+    read_text(text, study.scene, settings)  # refused with the names of the keys
     rows = [_with_absolute_files(row, keys, Path(study.scene).parent) for row in rows]
     base = scene.model_dump(mode="json", exclude_none=True)
     bounds = {short[name]: (each.low, each.high) for name, each in study.vary.items() if each.low is not None}
-    return Cases(base, keys, rows, _derived(study, rows), units, study.static, bounds)  # type: ignore[arg-type]
+    derived = {name: np.array(evaluated(f"derive.{name}", x, rows)) for name, x in study.derive.items()}
+    return Cases(base, keys, rows, derived, units, study.static, bounds)  # type: ignore[arg-type]
 
 
 def _refuse_names(keys: Mapping[str, Sequence[str]], study: Study) -> None:
@@ -347,16 +345,6 @@ def _chosen(study: Study, rows: list[Row]) -> list[Row]:
     if study.only_if is None:
         return rows
     return [row for row, is_in in zip(rows, evaluated("only_if", study.only_if, rows), strict=True) if is_in]
-
-
-def _derived(study: Study, rows: list[Row]) -> dict[str, np.ndarray]:
-    return {name: np.array(evaluated(f"derive.{name}", text, rows)) for name, text in study.derive.items()}
-
-
-def _check_keys(text: str, file: str, keys: Mapping[str, Sequence[str]], row: Row) -> None:
-    """SceneError if a key is none of the scene, or the first case is refused; with the names of the keys."""
-    settings = [f"{path}={json.dumps(row[name])}" for name, paths in keys.items() for path in paths]
-    read_text(text, file, settings)
 
 
 def _set(data: Any, path: str, value: Any) -> None:

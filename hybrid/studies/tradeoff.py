@@ -14,7 +14,6 @@ import io
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -186,7 +185,7 @@ def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
 def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     """Keys of the scene that the study ignores, and models that the scene does not admit."""
     time, output, lines = scene.require_time(), scene.written.output, scene.lines
-    called = {name: partial(_called, scene, name) for name in lines}
+    called = {name: lambda key, name=name: dotted(scene.form.place(("lines", name, key))) for name in lines}
     given = {name: scene.asked_scene(name).model for name in lines}
     dropped = [f"time.{x}" for x in ("step", "tolerance") if getattr(time, x) is not None]
     dropped += ["time.rho_inf"] if time.rho_inf > LEAST_DAMPED else []
@@ -204,11 +203,6 @@ def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     if chosen:
         notes += [f"Not admitted by the scene: {kind} ({why})." for kind, why in models.items() if why]
     return notes if dropped else notes[1:]
-
-
-def _called(scene: Scene, line: str, key: str) -> str:
-    """What a key of a line is called in the scene."""
-    return dotted(scene.form.place(("lines", line, key)))
 
 
 def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
@@ -483,15 +477,9 @@ def level_row(level: str, model: str, row: Row, values: Values, exact: Values, l
     out = LevelRow(level, model, row.status, row.cause, cells=row.cells, steps=row.steps, runs=row.runs, cpu=row.cpu)
     if not values:
         return out
-    position = float(np.linalg.norm(values["position"] - exact["position"], axis=-1).max()) / length
-    out = replace(out, position=position)
-    forces = [x for x in ("reaction_start", "reaction_end") if x in values and x in exact]
-    largest = max((float(np.linalg.norm(exact[x], axis=-1).max()) for x in forces), default=0.0)
-    if largest > 0.0:
-        worst = max(float(force_difference(values[x], exact[x]).max()) for x in forces)
-        out = replace(out, end_force=worst / largest)
+    found = with_errors(row, values, exact, length)
     peak, field = (_relative(values, exact, *x) for x in (("bending_moment", True), ("curvature", False)))
-    out = replace(out, moment=peak, curvature=field)
+    out = replace(out, position=found.position_part, end_force=found.end_force_part, moment=peak, curvature=field)
     asked = [(out.position, POSITION), (out.end_force, TENSION)]
     asked += [(out.moment, ALONG)] if level in ("B", "C") else []
     asked += [(out.curvature, ALONG)] if level == "C" else []

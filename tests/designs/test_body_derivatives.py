@@ -7,8 +7,8 @@ import pytest
 
 import hybrid
 from hybrid.designs import network_at_rest
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import changed_scene, with_number
-from hybrid.designs.sensitivity import at_rest
 from hybrid.model.nearby import seats_know_no_shape, shaped_anew
 from hybrid.model.network import NetworkResolution, bodies_of, build_system
 from hybrid.scene.read import as_scene

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import changed_scene
-from hybrid.designs.sensitivity import at_rest
 
 G = 9.81
 
@@ -469,6 +469,17 @@ def differ(made, of, keys):
         d = 1e-5 * min(abs(number), 1.0)
         more, less = (at_rest(changed_scene(made, key, number + x), of, 1.0, rest.places) for x in (d, -d))
         np.testing.assert_allclose(ours, (more.values - less.values) / (2.0 * d), rtol=2e-5, atol=1e-7, err_msg=key)
+
+
+def test_the_curvature_that_fades_at_ends_goes_by_the_stiffness():
+    """Of catenaries: by differences of equilibria, whose shape does not change with the stiffness."""
+    hinged = scene(LINE | {"bending_stiffness": 3e4}, pinned(0, 0, 0), pinned(150, 0, 10), "catenary", 240,
+                   {"fluid": SEA["fluid"]})  # fmt: skip
+    made, key, of = hybrid.validate_scene(hinged), "cable.sections[0].bending_stiffness", ["curvature@3"]
+    more, less = (results(changed_scene(made, key, 3e4 * x), of) for x in (1.001, 0.999))
+    rest, theirs = at_rest(made, of), (more - less) / (0.002 * 3e4)
+    np.testing.assert_allclose(rest.by([key])[0], theirs, rtol=1e-4)
+    assert abs(theirs[0] * 3e4 / rest.values[0]) > 0.01
 
 
 def test_a_number_that_switches_something_on():

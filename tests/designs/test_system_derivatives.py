@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import with_number
-from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene
 
 CHAIN = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import changed_scene
-from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene
 from tests.modal.test_touching import drum, over_sheave
 

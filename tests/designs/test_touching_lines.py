@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import changed_scene
-from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene
 from tests.validation.test_validation_lines_contact import crossing
 

@@ -7,9 +7,10 @@ import pytest
 
 import hybrid
 from hybrid.designs.line_at_rest import displaced
-from hybrid.designs.sensitivity import at_rest
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.linear.matrices import linear_line
+from hybrid.solve.stepper import JoinedLine
 from tests.solve.test_bed_of_depths import hill, mooring
 
 ROD = {
@@ -76,7 +77,11 @@ def test_it_is_what_the_equations_change_by(what):
     made = SCENES[what]()
     rest = at_rest(made, ["tension@0"])
     line, state = rest.lines[0], rest.lines[0].state.copy()
-    linear = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False)
+    here, free_ends = line.here, line.here.ends._replace(held=np.zeros(2, np.int8))
+    joined = JoinedLine(
+        here.model.line, here.sea, free_ends, here.model.length, here.model.tension_scale, -np.inf, (-1, -1)
+    )
+    linear = linear_line(joined, "cable", state, sticks=False, quick=False)
     free = np.flatnonzero(rest._network.lines[0].free)
     K = (linear.stiffness + linear.by_layers).toarray()[free]
     chord, pull = np.linalg.norm(state.e, axis=1).min(), np.abs(state.T).max()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import changed_scene
-from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.sea import Depths
 from tests.solve.test_bed_of_depths import PLANE, SLOPE, hill, mooring
 
