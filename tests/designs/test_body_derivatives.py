@@ -8,10 +8,11 @@ import pytest
 import hybrid
 from hybrid.designs import network_at_rest
 from hybrid.designs.network_at_rest import at_rest
-from hybrid.designs.numbers import changed_scene, with_number
+from hybrid.designs.numbers import with_number
 from hybrid.model.nearby import seats_know_no_shape, shaped_anew
 from hybrid.model.network import NetworkResolution, bodies_of, build_system
 from hybrid.scene.read import as_scene
+from tests.designs.differences import agree
 from tests.designs.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
 HULL = {
@@ -140,16 +141,7 @@ SCENES = {
 @pytest.mark.parametrize("what", SCENES)
 def test_differences_of_equilibria(what):
     """Bodies shift and turn with what holds them."""
-    tables, of, keys = SCENES[what]
-    made = as_scene(tables)
-    rest = at_rest(made, of)
-    for key, ours in zip(keys, rest.by(keys), strict=True):
-        number = rest.number(key)
-        d = 3e-5 * abs(number)
-        more, less = (at_rest(with_number(made, key, number + x), of).values for x in (d, -d))
-        floor = 1e-3 * np.abs(rest.values) / abs(number)
-        off = np.abs(ours - (more - less) / (2.0 * d)) / np.maximum(np.abs(ours), floor)
-        assert off.max() < 3e-6, (key, off)
+    agree(*SCENES[what], 3e-6, (3e-5,), with_number)
 
 
 @pytest.mark.parametrize("what", ["a clamp", "two bodies", "a point", "without normals", "twist that is given"])
@@ -238,10 +230,5 @@ def with_torque(law):
 @pytest.mark.parametrize("law", TORQUES)
 def test_torque_of_tension(law):
     """Without the tension of the cell after next, height by mass was off by a fifth, and twist by an eighth."""
-    made, of = with_torque(TORQUES[law]), ["tension@0", "max curvature", "position.z@50", "twist@50"]
-    rest = at_rest(made, of)
-    for key in ("cable.sections[0].mass", "ends.end.position[0]", "cable.sections[0].tension_torque"):
-        number = rest.number(key)
-        ours, d = rest.by([key])[0], 1e-5 * number
-        more, less = (at_rest(changed_scene(made, key, number + x), of).values for x in (d, -d))
-        np.testing.assert_allclose(ours, (more - less) / (2.0 * d), rtol=1e-5, err_msg=key)
+    keys = ["cable.sections[0].mass", "ends.end.position[0]", "cable.sections[0].tension_torque"]
+    agree(with_torque(TORQUES[law]), ["tension@0", "max curvature", "position.z@50", "twist@50"], keys, 1e-5)

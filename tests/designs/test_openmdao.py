@@ -17,14 +17,9 @@ import openmdao.api as om
 
 import hybrid
 from hybrid.scene.study import DESIGN
+from tests.designs.test_design import HANGING, LENGTH, MASS, TOP
 
-LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
 EXAMPLES = Path(__file__).parents[2] / "examples"
-HANGING = cable_scene(
-    {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e12}, pinned_at(0, 0, 0), "free", gravity=9.81, model="catenary",
-    mesh=10
-)  # fmt: skip
-TOP = {"quantity": "tension", "at": "start"}
 ROD = cable_scene(
     {"length": 110.0, "mass": 9.0, "diameter": 0.06, "axial_stiffness": 1e7, "bending_stiffness": 800.0,
      "torsional_stiffness": 800.0, "drag": {"normal": 1.2}},

@@ -9,6 +9,7 @@ import hybrid
 from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import with_number
 from hybrid.scene.read import as_scene
+from tests.designs.differences import agree
 
 CHAIN = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
 HOSE = {"length": 100.0, "mass": 10.0, "diameter": 0.08, "axial_stiffness": 1e7, "bending_stiffness": 400.0}
@@ -41,19 +42,9 @@ def moored(top, hose=False):
 )  # fmt: skip
 def test_lines_that_pull_at_a_buoy(hose, keys):
     """All forces and places answer to a number of any line, or of any point."""
-    made = as_scene(moored(BUOY, hose))
     of = ["east/tension@end", "north/reaction_start.x", "south/position.z@end", "max east/tension"]
     of += ["max hose/curvature", "hose/tension@start"] if hose else []
-    rest = at_rest(made, of)
-    for key, ours in zip(keys, rest.by(keys), strict=True):
-        number, least = rest.number(key), np.full(len(of), np.inf)
-        for part in (1e-3, 1e-4, 1e-5):
-            d = part * abs(number)
-            more, less = (at_rest(with_number(made, key, number + x), of).values for x in (d, -d))
-            theirs = (more - less) / (2.0 * d)
-            floor = 1e-3 * np.abs(rest.values) / abs(number)
-            least = np.minimum(least, np.abs(ours - theirs) / np.maximum(np.abs(theirs), floor))
-        assert least.max() < 1e-6, (key, least)
+    agree(moored(BUOY, hose), of, keys, 1e-6, (1e-4, 1e-3, 1e-5), with_number)
 
 
 def test_results_are_those_of_the_equilibrium():

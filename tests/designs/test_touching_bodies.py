@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
-from hybrid.designs.network_at_rest import at_rest
-from hybrid.designs.numbers import changed_scene
-from hybrid.scene.read import as_scene
+from tests.designs.differences import agree
 from tests.modal.test_touching import drum, over_sheave
 
 Tables = dict[str, Any]
@@ -42,14 +39,4 @@ SCENES: dict[str, tuple[Tables, list[str], list[str]]] = {
 @pytest.mark.long
 @pytest.mark.parametrize("what", SCENES)
 def test_differences_of_equilibria(what: str) -> None:
-    tables, of, keys = SCENES[what]
-    made = as_scene(tables)
-    rest = at_rest(made, of)
-    for key, ours in zip(keys, rest.by(keys), strict=True):
-        number = rest.number(key)
-        more, less = (
-            at_rest(changed_scene(made, key, number * (1.0 + x)), of, 1.0, rest.places).values for x in (1e-5, -1e-5)
-        )
-        theirs = (more - less) / (2e-5 * number)
-        least = 1e-3 * np.abs(rest.values / number)
-        assert (np.abs(ours - theirs) < 1e-5 * np.maximum(np.abs(theirs), least)).all(), (key, ours, theirs)
+    agree(*SCENES[what], 1e-5)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 import hybrid
 from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import changed_scene
 from hybrid.scene.read import as_scene
+from tests.designs.differences import agree
 from tests.validation.test_validation_lines_contact import crossing
 
 Tables = dict[str, Any]
@@ -85,21 +85,8 @@ SCENES: dict[str, tuple[Tables, list[str], list[str]]] = {
 @pytest.mark.parametrize("what", SCENES)
 def test_differences_of_equilibria(what: str) -> None:
     """Of what differs too much the one equilibrium lies between other sample points: then less counts."""
-    tables, of, keys = SCENES[what]
-    made = as_scene(tables)
-    rest = at_rest(made, of)
+    rest = agree(*SCENES[what], 1e-6, (1e-4, 1e-5, 3e-5, 3e-6))
     assert rest.contact is not None and rest.contact.stiffness.nnz
-    for key, ours in zip(keys, rest.by(keys), strict=True):
-        number, least = rest.number(key), np.full(len(of), np.inf)  # parts by which they differ
-        for step in (1e-4, 1e-5, 3e-5, 3e-6):
-            if least.max() < 1e-6:
-                break
-            d = step * (abs(number) or 1.0)
-            more, less = (at_rest(changed_scene(made, key, number + x), of, 1.0, rest.places).values for x in (d, -d))
-            floor = 1e-3 * np.abs(rest.values) / (abs(number) or 1.0)
-            theirs = (more - less) / (2.0 * d)
-            least = np.minimum(least, np.abs(ours - theirs) / np.maximum(np.abs(theirs), floor))
-        assert least.max() < 1e-6, (key, least)
 
 
 @pytest.mark.long

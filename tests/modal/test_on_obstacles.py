@@ -9,8 +9,8 @@ import pytest
 
 import hybrid
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.obstacle_scenes import over_pipe
-from tests.validation.test_validation_obstacles_accuracy import PIPE, as_system
+from tests.validation.obstacle_scenes import as_lines, over_pipe
+from tests.validation.test_validation_obstacles_accuracy import PIPE
 
 Tables = dict[str, Any]
 PUSH, AT, SPAN = 0.3, 3.0, 10.0  # m
@@ -29,7 +29,8 @@ def string(friction: float) -> Tables:
 
 def resting(**pipe: Any) -> Tables:
     """The rope over a pipe, at rest."""
-    tables = over_pipe(obstacles={"pipe": PIPE | pipe}, mesh={"cells": 96}, output={"every": 0.1, "points": 97})
+    tables = over_pipe(mesh={"cells": 96}, output={"every": 0.1, "points": 97})
+    tables["obstacles"]["pipe"] = PIPE | pipe
     del tables["time"], tables["ends"]["end"]["motion"]
     over = [[0, 0, 0], [2, 0, -1.3], [4, 0, -0.85], [6, 0, -0.9], [10, 0, 3]]
     tables["initial"] = {"kind": "equilibrium", "points": over}
@@ -54,9 +55,8 @@ def test_a_string_over_a_pipe_swings_as_strings_on_both_sides(friction: float) -
         periods = [x.period for x in found if x.what.startswith(what)]
         np.testing.assert_allclose(periods[:3], expected[: len(periods)][:3], rtol=4e-3)
         assert len(periods) >= 2
-    np.testing.assert_allclose(
-        [x.period for x in hybrid.modes(as_system(tables), count=6).modes], [x.period for x in found], rtol=1e-6
-    )
+    of_lines = hybrid.modes(as_lines(tables), count=6).modes
+    np.testing.assert_allclose([x.period for x in of_lines], [x.period for x in found], rtol=1e-6)
 
 
 def test_the_response_is_the_motion_of_a_run_and_says_where_it_lifts_off() -> None:

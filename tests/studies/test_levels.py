@@ -18,14 +18,9 @@ from hybrid.scene.root import in_full
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies import runs
 from hybrid.studies.tradeoff import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
-from tests.scenes import cable_scene, pinned_at
+from tests.studies.test_trade import SAG as SAGS
 
-SAG: dict[str, Any] = cable_scene(
-    {"length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
-     "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}},
-    pinned_at(0, 0, -5), pinned_at(10, 0, -5, motion={"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 2}),
-    title="a line that sags", fluid={"density": 1025}, time={"duration": 1.0}, output=(0.1, 25)
-)  # fmt: skip
+SAG = {name: x for name, x in SAGS.items() if name not in ("model", "mesh")} | {"time": {"duration": 1.0}}
 
 
 def values(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,17 @@ def heavy_capstan(friction: float) -> Tables:
     }  # fmt: skip
 
 
+def as_lines(tables: Tables) -> Tables:
+    """The scene of a cable as one of several lines, `rope` between the points a and b."""
+    keys = ("model", "contact", "initial", "mesh")
+    line = {"start": "a", "end": "b", **tables["cable"], **{k: tables[k] for k in keys if k in tables}}
+    points = {
+        x: {k: y for k, y in tables["ends"][end].items() if k != "kind"} for x, end in (("a", "start"), ("b", "end"))
+    }
+    own = {k: x for k, x in tables.items() if k not in (*keys, "cable", "ends")}
+    return deepcopy(own | {"points": points, "lines": {"rope": line}})
+
+
 def over_pipe(**more: Any) -> Tables:
     """A rope that hangs between two points and lies over a pipe on its way, askew."""
     section = {"length": 12.0, "mass": 2.0, "diameter": 0.05, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
@@ -71,6 +83,26 @@ def over_pipe(**more: Any) -> Tables:
         "initial": "equilibrium", "model": "rod", "mesh": {"cells": 64}, "contact": {"self": False},
         "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.2, "points": 65},
     } | more  # fmt: skip
+
+
+def over_beam(beam: Tables, turn: float = 0.0) -> Tables:
+    """The rope over a beam in place of the pipe, askew; turn: rad, of all, about z."""
+    c, s = np.cos(turn), np.sin(turn)
+    M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    at = {"at": (M @ [4, 0, -1.7]).tolist(), "rotation": [5, -10, 15 + float(np.degrees(turn))], "friction": 0.3}
+    tables = over_pipe(obstacles={"beam": beam | at}, mesh={"cells": 120})
+    for end in tables["ends"].values():
+        end["position"] = (M @ end["position"]).tolist()
+    travel = tables["ends"]["end"]["motion"]["travel"]
+    travel["by"] = (M @ travel["by"]).tolist()
+    return tables
+
+
+def is_turned(other: Any, one: Any, turn: float) -> None:
+    """The run of a rope over a beam with all of the scene turned about z, rad, beside that as it stands."""
+    c, s = np.cos(turn), np.sin(turn)
+    np.testing.assert_allclose(other.position, one.position @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), atol=1.2e-8)
+    np.testing.assert_allclose(other.tension, one.tension, atol=1e-7 * one.tension.max())
 
 
 def paid_over_drum(

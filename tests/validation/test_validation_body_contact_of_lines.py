@@ -26,7 +26,7 @@ from hybrid.simulation.lines_contact import shared_of
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
 from tests.scenes import line_between, network_scene
-from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed
+from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed, turns_with_its_scene
 from tests.validation.thrown_lines import WIDTH, straight, throw
 
 Tables = dict[str, Any]
@@ -67,20 +67,7 @@ def test_a_ball_presses_lines_on_each_other(fallen: Any) -> None:
 
 
 def test_a_turned_scene_moves_the_same(fallen: Any) -> None:
-    angle = np.radians(40.0)
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    tables = crossed()
-    for point in tables["points"].values():
-        point["position"] = (turn @ point["position"]).tolist()
-    ball = tables["bodies"]["ball"]
-    ball["initial_guess"], ball["moment"] = (turn @ ball["initial_guess"]).tolist(), (turn @ ball["moment"]).tolist()
-    ball["initial_rotation"][2] += 40.0
-    for line in tables["lines"].values():
-        line["initial"]["direction"] = (turn @ line["initial"]["direction"]).tolist()
-    result = hybrid.run(tables)
-    np.testing.assert_allclose(result["bodies/ball/position"], fallen["bodies/ball/position"] @ turn.T, atol=1e-7)
-    for side, x in fallen.lines.items():
-        np.testing.assert_allclose(result.lines[side].position, x.position @ turn.T, atol=1e-7)
+    turns_with_its_scene(crossed(), fallen, 1e-7)
 
 
 def test_a_very_heavy_body_is_an_obstacle() -> None:

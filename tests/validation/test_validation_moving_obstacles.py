@@ -5,7 +5,6 @@ Friction acts on the centreline (docs/theory.md), so that exponents are those of
 
 from __future__ import annotations
 
-from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.obstacle_scenes import CENTRELINE, STRAND, Tables, capstan, half_turn
+from tests.validation.obstacle_scenes import CENTRELINE, STRAND, Tables, as_lines, capstan, half_turn
 
 MU = 0.3
 
@@ -296,17 +295,6 @@ def test_no_step_carries_a_pipe_through_a_rope() -> None:
     assert (w[-1, 38:43, 2] > 0.0).all()  # its middle has been carried along
 
 
-def turned(tables: Tables, M: Any) -> Tables:
-    found = deepcopy(tables)
-    pipe = found["obstacles"]["pipe"]
-    for key in ("at", "axis"):
-        pipe[key] = (M @ pipe[key]).tolist()
-    pipe["motion"]["velocity"] = (M @ pipe["motion"]["velocity"]).tolist()
-    for key in ("direction", "origin"):
-        found["initial"][key] = (M @ np.array(found["initial"][key], float)).tolist()
-    return found
-
-
 # --- several lines, checkpoints, from outside -------------------------------------------------------------
 
 
@@ -348,18 +336,6 @@ def test_a_smooth_obstacle_does_no_work_of_friction() -> None:
     assert -0.1 * done < result["work/scheme"].min() <= result["work/scheme"].max() < 1e-3 * done
 
 
-def as_system(tables: Tables) -> Tables:
-    """The same as a system of one line."""
-    found = deepcopy(tables)
-    cable, ends = found.pop("cable"), found.pop("ends")
-    line = {key: found.pop(key) for key in ("initial", "model", "mesh", "contact")}
-    found["points"] = {
-        name: {"kind": "fixed", "position": ends[end]["position"]} for name, end in (("a", "start"), ("b", "end"))
-    }
-    found["lines"] = {"rope": line | cable | {"start": "a", "end": "b"}}
-    return found
-
-
 def from_outside() -> Tables:
     tables = pushed()
     del tables["obstacles"]["bar"]["motion"]
@@ -398,7 +374,7 @@ def stepped(tables: Tables, again: bool) -> Any:
 
 @pytest.mark.parametrize("several", [False, True])
 def test_an_obstacle_that_is_set_from_outside_moves_as_by_a_motion(aside: Any, several: bool) -> None:
-    tables = as_system(from_outside()) if several else from_outside()
+    tables = as_lines(from_outside()) if several else from_outside()
     bar, result = stepped(tables, False)
     rope = result.lines["rope"] if several else result
     np.testing.assert_allclose(rope.position, aside.position, atol=1e-4)
@@ -438,7 +414,7 @@ def test_motions_that_cannot_be_computed_are_refused(change: Tables, where: str,
     tables = pushed()
     tables["obstacles"]["bar"] |= change
     with pytest.raises(SceneError) as refused:
-        hybrid.validate_scene(as_system(tables) if several else tables)
+        hybrid.validate_scene(as_lines(tables) if several else tables)
     assert [x.where for x in refused.value.complaints] == [where]
 
 

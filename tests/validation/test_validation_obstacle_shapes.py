@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.view.figure import Area
 from hybrid.view.projections import outlines, surfaces, view_named
-from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, capstan, over_pipe
+from tests.meshes import box, text_stl
+from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, capstan, is_turned, over_beam
 from tests.validation.test_validation_obstacles import falling
 
 MU, EDGE = 0.3, 0.1
@@ -67,27 +69,17 @@ def test_a_smooth_surface_presses_by_tension_over_radius(kind: str) -> None:
     np.testing.assert_allclose(result.tension[-1], 10.0, rtol=2e-3)
 
 
-def over_box(turn: float = 0.0) -> dict[str, Any]:
-    """A rope that hangs between two points and lies over a beam on its way, askew; turn: rad, of all, about z."""
-    M = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
-    beam = {"kind": "box", "at": (M @ [4, 0, -1.7]).tolist(), "size": [2.0, 3.0, 2.2], "rounding": 0.4,
-            "rotation": [5, -10, 15 + float(np.degrees(turn))], "friction": 0.3}  # fmt: skip
-    tables = over_pipe(obstacles={"beam": beam}, mesh={"cells": 120})
-    for end in tables["ends"].values():
-        end["position"] = (M @ end["position"]).tolist()
-    travel = tables["ends"]["end"]["motion"]["travel"]
-    travel["by"] = (M @ travel["by"]).tolist()
-    return tables
+BEAM = {"kind": "box", "size": [2.0, 3.0, 2.2], "rounding": 0.4}
 
 
 @pytest.fixture(scope="module")
 def laid() -> Any:
-    return ran(over_box())
+    return ran(over_beam(BEAM))
 
 
 def test_an_equilibrium_over_a_beam_is_found_from_the_scene_alone(laid: Any) -> None:
     """It lies on the beam that its catenary would pass through, and nowhere deeper than it may."""
-    away = distances(build(one_line(hybrid.validate_scene(over_box()))).sea.values, laid.position[0])[0]
+    away = distances(build(one_line(hybrid.validate_scene(over_beam(BEAM)))).sea.values, laid.position[0])[0]
     assert -0.05 * 0.05 < away.min() < 0.0
     assert {e.kind for e in laid.events} == {"static friction neglected"}
 
@@ -98,16 +90,14 @@ def test_energy_over_a_beam_is_booked(laid: Any) -> None:
 
 
 def test_a_rotated_scene_has_a_rotated_result(laid: Any) -> None:
-    other, c, s = ran(over_box(0.7)), np.cos(0.7), np.sin(0.7)
-    M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_allclose(other.position, laid.position @ M.T, atol=1e-9 * 12.0)
-    np.testing.assert_allclose(other.tension, laid.tension, atol=1e-7 * laid.tension.max())
+    is_turned(ran(over_beam(BEAM, 0.7)), laid, 0.7)
 
 
-@pytest.mark.parametrize("kind", ["box", "torus"])
-def test_no_step_carries_a_line_through(kind: str) -> None:
+@pytest.mark.parametrize("kind", ["box", "torus", pytest.param("mesh", marks=pytest.mark.long)])
+def test_no_step_carries_a_line_through(kind: str, tmp_path: Path) -> None:
     """At 20 m/s in steps of 0.02 s, 0.4 m: through a beam of 0.2 m, or the section of a ring of 0.2 m, in one step."""
-    shapes = {
+    shapes: dict[str, Any] = {
+        "mesh": {"kind": "mesh", "file": text_stl(tmp_path / "bar.stl", box((0.2, 2.0, 0.2))), "at": [0, 0, 0]},
         "box": {"kind": "box", "at": [0, 0, 0], "size": [0.2, 2.0, 0.2], "rounding": 0.05},
         "torus": {"kind": "torus", "at": [0, 0, -1], "axis": [1, 0, 0], "ring": 1.0, "radius": 0.1},
     }
@@ -143,6 +133,6 @@ def test_drawings_of_boxes_rings_and_sheaves() -> None:
         x = np.column_stack([each[a] for a in "xyz"])
         np.testing.assert_allclose(distances(sea, x)[list(DRUMS).index(each["name"])] + 0.01, 0.0, atol=1e-9)
         assert max(*each["i"], *each["j"], *each["k"]) == len(x) - 1
-    box, _, ring = (x for x in outlines(result, view_named("xz"), 0) if isinstance(x, Area))
-    np.testing.assert_allclose(np.ptp(box.outlines[0], axis=0), 2 * DRUM, rtol=0.02)
+    beam, _, ring = (x for x in outlines(result, view_named("xz"), 0) if isinstance(x, Area))
+    np.testing.assert_allclose(np.ptp(beam.outlines[0], axis=0), 2 * DRUM, rtol=0.02)
     assert ring.outlines.shape[1:] == (4, 2)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.validation.obstacle_scenes import CENTRELINE, DRUM, Tables, over_pipe, paid_over_drum
-from tests.validation.test_validation_moving_obstacles import as_system, pushed, stepped
+from tests.validation.obstacle_scenes import CENTRELINE, DRUM, Tables, as_lines, over_pipe, paid_over_drum
+from tests.validation.test_validation_moving_obstacles import pushed, stepped
 from tests.validation.test_validation_obstacles_accuracy import ASKED, DRAGGED, LOW, parts
 
 DATA = Path(__file__).parents[1] / "data"
@@ -86,15 +86,8 @@ def test_zones_that_move_on_a_beam_have_the_answer_of_rods() -> None:
     assert {x.kind for row in zones.zones for x in row} == {"rod", "catenary"}
     off = np.linalg.norm(np.array(zones.position) - np.array(rods.position), axis=2).max()
     assert off < 0.012  # their tolerance, 1e-3 of 12 m
-    system = hybrid.run(_several(tables | {"model": moving})).lines["rope"]
+    system = hybrid.run(as_lines(tables | {"model": moving})).lines["rope"]
     np.testing.assert_allclose(system.position, zones.position, atol=1e-4)
-
-
-def _several(tables: Tables) -> Tables:
-    """The rope over a beam as a system of one line; the end that is moved is a point that is."""
-    found = as_system(tables)
-    found["points"]["b"] |= {"motion": tables["ends"]["end"]["motion"]}
-    return found
 
 
 @pytest.mark.long

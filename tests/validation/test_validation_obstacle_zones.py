@@ -9,7 +9,8 @@ import pytest
 
 import hybrid
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.test_validation_obstacles_accuracy import DRAGGED, HEAVE, PIPE, as_system
+from tests.validation.obstacle_scenes import as_lines
+from tests.validation.test_validation_obstacles_accuracy import DRAGGED, HEAVE, MOVES, PIPE
 
 Tables = dict[str, Any]
 MOVING = {"kind": "adaptive", "always_move": True, "tolerance": 1e-3}
@@ -42,16 +43,17 @@ def test_a_line_is_rod_where_it_touches_and_moves_as_one_that_is_rod_everywhere(
     assert kinds == {"rod", "catenary"} and (gap < 0.0).any()
     assert apart(catenary, rods) > 0.025
     assert 1e-4 < apart(zones, rods) < 0.01
-    system = hybrid.run(as_system(fixed(tables, MOVING))).lines["one"]
+    system = hybrid.run(as_lines(fixed(tables, MOVING))).lines["rope"]
     assert apart(system, zones) < 1e-4
 
 
 @pytest.mark.long
-def test_cells_that_follow_the_curvature_show_a_pipe() -> None:
+@pytest.mark.parametrize("scene", [DRAGGED, MOVES], ids=["dragged", "pipe moves"])
+def test_cells_that_follow_the_curvature_show_a_pipe(scene: Tables) -> None:
     """The curvature on it and elsewhere to the share that is asked."""
-    tables = fixed(DRAGGED, {"kind": "adaptive", "curvature_error": 0.05})
+    tables = fixed(scene, {"kind": "adaptive", "curvature_error": 0.05})
     del tables["mesh"]
-    follows, rods = hybrid.run(tables), hybrid.run(fixed(DRAGGED, "rod") | {"mesh": {"cells": 384}})
+    follows, rods = hybrid.run(tables), hybrid.run(fixed(scene, "rod") | {"mesh": {"cells": 384}})
     kappa = np.array(rods["curvature"])
     error = np.abs(np.array(follows["curvature"]) - kappa).max() / kappa.max()
     assert 1e-3 < error < 0.05

@@ -17,7 +17,7 @@ from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, capstan, heavy_capstan, over_pipe
+from tests.validation.obstacle_scenes import CENTRELINE, STRAND, capstan, heavy_capstan, over_pipe
 
 MU = 0.3
 
@@ -239,10 +239,6 @@ def test_an_equilibrium_within_an_obstacle_is_refused() -> None:
     tables["cable"]["sections"][0]["length"] = 10.5
     with pytest.raises(hybrid.ComputationError):
         hybrid.static(hybrid.validate_scene(tables))
-
-
-def test_a_drum_is_wider_than_its_radius_by_the_strand() -> None:
-    assert pytest.approx(DRUM + STRAND) == CENTRELINE
 
 
 @pytest.mark.parametrize(("cells", "said"), [(31, True), (120, False)])

@@ -11,7 +11,7 @@ import hybrid
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.obstacle_scenes import over_pipe
+from tests.validation.obstacle_scenes import as_lines, over_pipe
 
 Tables = dict[str, Any]
 # Estimated over true error, as asked of the project; the upper bound is wider where the result is far better than asked.
@@ -76,24 +76,13 @@ def test_figures_are_those_of_a_fine_run_and_steps_meet_what_is_asked(tables: Ta
         assert said < HIGH * max(true, FAR_BELOW * ASKED), (name, said, true)
 
 
-def as_system(tables: Tables) -> Tables:
-    """The scene as one of several lines."""
-    keys = ("model", "contact", "initial", "mesh")
-    line = {"start": "a", "end": "b", **tables["cable"], **{k: tables[k] for k in keys if k in tables}}
-    points = {
-        x: {k: y for k, y in tables["ends"][end].items() if k != "kind"} for x, end in (("a", "start"), ("b", "end"))
-    }
-    own = {k: x for k, x in tables.items() if k not in (*keys, "cable", "ends")}
-    return own | {"points": points, "lines": {"one": line}}
-
-
 @pytest.mark.long
 def test_figures_of_given_cells_and_steps(heaved: Any) -> None:
     """Both-sided, of tension too, whose slope jumps where friction begins: of order 1.  Of a system of one line as well."""
     given = HEAVE | {
         "mesh": {"cells": 128}, "time": {"duration": 6.0, "step": 0.05}, "output": HEAVE["output"] | {"errors": True}
     }  # fmt: skip
-    alone, system = hybrid.run(given), hybrid.run(as_system(given)).lines["one"]
+    alone, system = hybrid.run(given), hybrid.run(as_lines(given)).lines["rope"]
     for result in (alone, system):
         for name, (said, true) in parts(result, heaved).items():
             assert LOW * true < said < HIGH * true, (name, said, true)
@@ -106,8 +95,8 @@ def test_figures_of_given_cells_and_steps(heaved: Any) -> None:
 def test_a_rope_lies_over_the_pipe_on_any_cells(model: str, cells: int) -> None:
     """Not round it, stretched by 17 %, where its catenary hangs through the pipe; of order 2 from 25 cells on."""
     at_rest = scene(None, 1.0) | {"model": model, "mesh": {"cells": cells}}
-    with hybrid.static(at_rest) as alone, hybrid.static(as_system(at_rest)) as system:
-        for found in (alone, system.lines["one"]):
+    with hybrid.static(at_rest) as alone, hybrid.static(as_lines(at_rest)) as system:
+        for found in (alone, system.lines["rope"]):
             place = found.position[-1]
             top = np.interp(PIPE["at"][0], place[:, 0], place[:, 2])
             assert top == pytest.approx(-0.878, abs=0.05 if cells < 25 else 0.01)
@@ -171,8 +160,8 @@ def under_pipe(cells: int, x: float = 5.0, **more: Any) -> dict[str, Any]:
 def test_a_line_that_hangs_through_a_pipe_lies_on_it_on_any_mesh(cells: int, x: float) -> None:
     """On most of these meshes it was found round the pipe from below, stretched by 1 %, within what it bears."""
     alone = hybrid.static(hybrid.validate_scene(under_pipe(cells, x)))
-    system = hybrid.static(as_system(under_pipe(cells, x)))
-    for tension, events in ((alone.tension, alone.events), (system.lines["one"].tension, system.events)):
+    system = hybrid.static(as_lines(under_pipe(cells, x)))
+    for tension, events in ((alone.tension, alone.events), (system.lines["rope"].tension, system.events)):
         assert tension.max() == pytest.approx(53.0, rel=0.01)
         assert not any(event.kind == "several equilibria" for event in events)
 
@@ -180,8 +169,8 @@ def test_a_line_that_hangs_through_a_pipe_lies_on_it_on_any_mesh(cells: int, x: 
 def test_a_line_that_is_found_behind_a_pipe_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no way leads to the other side: stretched round the pipe, here without the ways that do."""
     monkeypatch.setattr("hybrid.simulation.equilibrium.behind_obstacles", lambda *_: iter(()))
-    with hybrid.static(as_system(under_pipe(100))) as found:
-        one = found.lines["one"]
+    with hybrid.static(as_lines(under_pipe(100))) as found:
+        one = found.lines["rope"]
         (said,) = [x for x in one.events if x.kind == "several equilibria"]
         assert one.tension.max() > 1e4 and "obstacle pipe" in said.text
 

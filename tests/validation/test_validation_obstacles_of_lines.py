@@ -156,22 +156,8 @@ def test_a_body_makes_obstacles_stiff_enough() -> None:
 # --- what is refused -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("change", "where", "says"),
-    [
-        ({"points.top.position": [0, 0, DRUM]}, "points.top.position", "obstacles.drum"),
-    ],
-)  # fmt: skip
-def test_what_does_not_go_with_obstacles_is_refused(change: Tables, where: str, says: str) -> None:
+def test_a_point_within_an_obstacle_is_refused() -> None:
     tables = weight_over_a_drum(MU)
-    for path, value in change.items():
-        *way, key = path.split(".")
-        at = tables
-        for name in way:
-            at = at[name]
-        at[key] = value
-    if "position" in where:
-        tables["points"]["top"]["position"] = [0, 0, 0.9 * DRUM]
-    with pytest.raises(SceneError) as refused:
+    tables["points"]["top"]["position"] = [0, 0, 0.9 * DRUM]
+    with pytest.raises(SceneError, match=r"points\.top\.position[\s\S]*obstacles\.drum"):
         hybrid.run(tables)
-    assert any(where in x.where and says in str(refused.value) for x in refused.value.complaints), refused.value

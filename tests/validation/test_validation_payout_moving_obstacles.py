@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from tests.combinations.pairs import as_network, seen_by, turned_and_mirrored
 from tests.validation.obstacle_scenes import CENTRELINE, Tables, paid_over_drum
-from tests.validation.test_validation_payout_obstacles import kick, pull, slow
+from tests.validation.test_validation_payout_obstacles import kick, pull, rests_as, slow
 
 MU, ANGLE, PULL, RATE = 0.3, 2.0, 8.0, 0.1
 WITH_IT = RATE / CENTRELINE  # 1/s, spin at which the drum runs as fast as line that is paid out at RATE
@@ -168,30 +168,16 @@ def test_slow_payout_over_a_free_sheave_is_the_equilibrium_of_that_length_withou
     scene["obstacles"]["pipe"] |= {"friction": 0.4, "bearing": {"inertia": 0.5, "damping": 5.0}}
     scene["time"]["duration"] = 14.0
     result = hybrid.run(scene)
-    length = float(result["payout/length"][-1])
-    rest = hybrid.static({key: x for key, x in slow(length, "rod").items() if key not in ("time", "output")})
-    there = np.array(result.s) <= length
-    s, last = np.array(result.s)[there], result.position[-1, there]
-    expected = np.stack([np.interp(s, rest.s, rest.position[0, :, k]) for k in range(3)], axis=1)
-    assert np.abs(last - expected).max() < 1e-3 * length
-    assert pull(result)[-1] == pytest.approx(pull(rest)[0], rel=2e-3)
-    assert abs(result["work/scheme"][-1]) < 1e-4 * abs(result["work/end"][-1])
+    rests_as(result, slow(float(result["payout/length"][-1]), "rod"), 1e-3, 2e-3)
 
 
 def test_slow_payout_over_a_pipe_that_moves_is_the_equilibrium_where_it_ends() -> None:
     scene, by = slow(12.0, "rod", 0.1), [0.2, 0.1, 0.3]
     scene["obstacles"]["pipe"]["motion"] = {"travel": {"by": by, "over": 6.0}}
     result = hybrid.run(scene)
-    length = float(result["payout/length"][-1])
-    there = slow(length, "rod")
+    there = slow(float(result["payout/length"][-1]), "rod")
     there["obstacles"]["pipe"]["at"] = np.add(there["obstacles"]["pipe"]["at"], by).tolist()
-    rest = hybrid.static({key: x for key, x in there.items() if key not in ("time", "output")})
-    on = np.array(result.s) <= length
-    s, last = np.array(result.s)[on], result.position[-1, on]
-    expected = np.stack([np.interp(s, rest.s, rest.position[0, :, k]) for k in range(3)], axis=1)
-    assert np.abs(last - expected).max() < 3e-4 * length
-    assert pull(result)[-1] == pytest.approx(pull(rest)[0], rel=3e-4)
-    assert abs(result["work/scheme"][-1]) < 1e-4 * abs(result["work/end"][-1])
+    rests_as(result, there, 3e-4, 3e-4)
 
 
 # --- the same said otherwise ----------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Lines that a winch pays out, or takes in, over fixed obstacles: capstans, equilibria, energy, the same said otherwise."""
+"""Lines that a winch pays out, or takes in, over fixed obstacles: capstans, equilibria, energy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from hybrid.kernels.state.report import OBSTACLE, PIECE_END, STIFFNESS, STRAND, 
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.scene.read import one_line
-from tests.combinations.pairs import seen_by, turned_and_mirrored
 from tests.problems import tables_with
 from tests.validation.obstacle_scenes import over_pipe, paid_over_drum
 
@@ -114,35 +113,6 @@ def test_a_line_that_slides_on_the_bed_at_the_winch_pulls_by_its_weight(rate: fl
     assert abs(result["work/scheme"][-1]) < 1e-4 * abs(result["work/end"][-1])
 
 
-# --- the same said otherwise ----------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def chute() -> Any:
-    """Clamped on the drum, whose output times are steps."""
-    scene = paid_over_drum(MU, 0.1, 0.0, clamp=True, time={"duration": 2.0, "step": 0.01})
-    scene["ends"]["end"]["payout"]["longest"] = 2.5
-    return scene, hybrid.run(scene)
-
-
-def test_a_scene_turned_and_mirrored_has_the_same_answer(chute: Any) -> None:
-    scene, one = chute
-    M = turned_and_mirrored()
-    two = hybrid.run(seen_by(M, scene))
-    assert np.abs(two.position - one.position @ M.T).max() < 1e-9
-    np.testing.assert_allclose(two.tension, one.tension, rtol=1e-7)
-
-
-def test_a_winch_at_the_start_is_the_mirror_image(chute: Any) -> None:
-    _, one = chute
-    scene = paid_over_drum(MU, 0.1, 0.0, clamp=True, winch="start", time={"duration": 2.0, "step": 0.01})
-    scene["ends"]["start"]["payout"]["longest"] = 2.5
-    two = hybrid.run(scene)
-    np.testing.assert_allclose(pull(two, "start"), pull(one), rtol=1e-6)
-    for name, other in (("work/friction", "work/friction"), ("work/end", "work/start")):
-        assert np.abs(two[other] - one[name]).max() < 1e-6 * np.abs(one[name]).max()
-
-
 # --- equilibria over a pipe -----------------------------------------------------------------------
 
 
@@ -159,21 +129,29 @@ def slow(length: float, model: str, rate: float = 0.0) -> dict[str, Any]:
     return scene | {"time": {"duration": 9.0, "step": 0.02}}
 
 
+def rests_as(result: Any, there: dict[str, Any], off: float, of_pull: float) -> None:
+    """A line that was paid out slowly is, within parts of length and pull, at rest as a scene of that length."""
+    length, rest = (
+        float(result["payout/length"][-1]),
+        hybrid.static({x: y for x, y in there.items() if x not in ("time", "output")}),
+    )
+    on = np.array(result.s) <= length
+    s, last = np.array(result.s)[on], result.position[-1, on]
+    expected = np.stack([np.interp(s, rest.s, rest.position[0, :, k]) for k in range(3)], axis=1)
+    assert np.abs(last - expected).max() < off * length  # by cells that lie elsewhere on the pipe
+    assert pull(result)[-1] == pytest.approx(pull(rest)[0], rel=of_pull)
+    assert abs(result["work/scheme"][-1]) < 1e-4 * abs(result["work/end"][-1])
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(("model", "rate"), [("rod", 0.1), ("catenary", 0.1), ("rod", -0.05)])
 def test_slow_payout_over_a_pipe_is_the_equilibrium_of_that_length(model: str, rate: float) -> None:
     result = hybrid.run(slow(12.0, model, rate))
     length = float(result["payout/length"][-1])
-    scene = slow(length, model)
-    rest = hybrid.static({key: x for key, x in scene.items() if key not in ("time", "output")})
-    there = np.array(result.s) <= length
-    s, last = np.array(result.s)[there], result.position[-1, there]
+    last = result.position[-1, np.array(result.s) <= length]
     away = np.hypot(last[:, 0] - 4.0, last[:, 2] + 1.7) - 1.2 - 0.025
     assert -0.05 * 0.05 < away.min() < 1e-4 and (away < 1e-3).sum() >= 2  # it lies on the pipe
-    expected = np.stack([np.interp(s, rest.s, rest.position[0, :, k]) for k in range(3)], axis=1)
-    assert np.abs(last - expected).max() < 3e-4 * length  # by cells that lie elsewhere on the pipe
-    assert pull(result)[-1] == pytest.approx(pull(rest)[0], rel=3e-5)
-    assert abs(result["work/scheme"][-1]) < 1e-4 * abs(result["work/end"][-1])
+    rests_as(result, slow(length, model), 3e-4, 3e-5)
 
 
 @pytest.mark.long

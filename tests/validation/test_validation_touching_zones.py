@@ -162,16 +162,6 @@ def test_a_line_on_a_pipe_that_moves_is_rod_there(heaving: Any) -> None:
     assert grips.max() < 0.02 * np.abs(rods["obstacles/pipe/force"]).max()
 
 
-@pytest.mark.long
-def test_cells_that_follow_the_curvature_show_a_pipe_that_moves() -> None:
-    tables = fixed(MOVES, {"kind": "adaptive", "curvature_error": 0.05})
-    del tables["mesh"]
-    follows, rods = hybrid.run(tables), hybrid.run(fixed(MOVES, "rod") | {"mesh": {"cells": 384}})
-    kappa = np.array(rods["curvature"])
-    error = np.abs(np.array(follows["curvature"]) - kappa).max() / kappa.max()
-    assert 1e-3 < error < 0.05
-
-
 # Zones beside rods of their mesh; cells that follow, which are asked for a tenth of the curvature, beside fine rods.
 @pytest.mark.parametrize(
     ("model", "cells", "part"),
