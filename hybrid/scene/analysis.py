@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from itertools import accumulate, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Discriminator, Field, Tag
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import (
@@ -16,6 +16,7 @@ from hybrid.scene.base import (
     Before,
     Direction,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     NonNegativePair,
@@ -94,12 +95,10 @@ class Points(Table):
         "stretched as it hangs; absent: in proportion to the polyline [m]",
     )
 
-    @model_validator(mode="after")
-    def _corners_are_distinct(self) -> Points:
-        refuse(_doubled(self.points))
+    def _check_corners_are_distinct(self) -> Findings:
+        yield _doubled(self.points)
         if self.arc_lengths is not None:
-            refuse(_disordered(self.arc_lengths, len(self.points)))
-        return self
+            yield _disordered(self.arc_lengths, len(self.points))
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -136,17 +135,15 @@ class Equilibrium(Table):
         "touch a line, a body or what moves, or is not found so",
     )
 
-    @model_validator(mode="after")
-    def _one_guess(self) -> Equilibrium:
+    def _check_one_guess(self) -> Findings:
         if self.points is not None:
             fix = "leave out either points or guess and direction"
             both = [name for name, given in (("guess", self.guess != "auto"), ("direction", self.direction)) if given]
-            refuse(Finding((name,), "nothing, because points already gives the shape", fix) for name in both)
-            refuse(_doubled(self.points))
+            yield (Finding((name,), "nothing, because points already gives the shape", fix) for name in both)
+            yield _doubled(self.points)
         elif self.direction is not None and self.guess not in ("auto", "straight"):
             expected = f"nothing, because a direction is for a straight guess and guess is {self.guess}"
-            refuse([Finding(("direction",), expected, "leave direction out, or use guess: straight")])
-        return self
+            yield [Finding(("direction",), expected, "leave direction out, or use guess: straight")]
 
 
 def without_friction(initial: Straight | Points | Equilibrium) -> Straight | Points | Equilibrium:
@@ -296,13 +293,11 @@ class AdaptiveModel(Table):
         "this table asks for that too",
     )
 
-    @model_validator(mode="after")
-    def _cells_follow(self) -> AdaptiveModel:
+    def _check_cells_follow(self) -> Findings:
         if self.rod_cell is not None and self.curvature_error is None:
             expected = "nothing, because rods and catenaries have the cells of one mesh, which stay"
             fix = "leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow"
-            refuse([Finding(("rod_cell",), expected, fix)])
-        return self
+            yield [Finding(("rod_cell",), expected, fix)]
 
 
 def usual_model(cable: Any, obstacles: Any = None) -> RodModel | CatenaryModel | AdaptiveModel:
@@ -338,8 +333,7 @@ class Mesh(Table):
         default=None, min_length=3, description="arc length of every node, from 0 to the length of the cable [m]"
     )
 
-    @model_validator(mode="after")
-    def _one_recipe(self) -> Mesh:
+    def _check_one_recipe(self) -> Findings:
         if self.nodes is not None:
             fix = "leave out either nodes or cells and ratio"
             both = [name for name in ("cells", "ratio") if getattr(self, name) is not None]
@@ -348,8 +342,7 @@ class Mesh(Table):
                 found.append(
                     Finding(("nodes",), "numbers that increase strictly, in m", "sort them and drop duplicates")
                 )
-            refuse(found)
-        return self
+            yield found
 
 
 class Resolution(Table):
@@ -389,15 +382,13 @@ class Time(Table):
         default=0.5, ge=0, le=1, description="spectral radius of generalized-alpha at high frequency; 1: no damping [-]"
     )
 
-    @model_validator(mode="after")
-    def _step_fits(self) -> Time:
+    def _check_step_fits(self) -> Findings:
         if self.step is not None and self.step > self.duration:
             expected = f"at most the duration, {self.duration:.6g} s"
-            refuse([Finding(("step",), expected, "a smaller step or a longer duration")])
+            yield [Finding(("step",), expected, "a smaller step or a longer duration")]
         if self.controlled and self.rho_inf > LEAST_DAMPED:
             expected = f"at most {LEAST_DAMPED:g} where steps follow the motion: above, steps that change are unstable"
-            refuse([Finding(("rho_inf",), expected, "0.5 is usual; or give a fixed step (time.step)")])
-        return self
+            yield [Finding(("rho_inf",), expected, "0.5 is usual; or give a fixed step (time.step)")]
 
     @property
     def controlled(self) -> bool:
@@ -467,15 +458,13 @@ class Output(Table):
         "asked for, or steps follow the motion",
     )
 
-    @model_validator(mode="after")
-    def _points_increase(self) -> Output:
+    def _check_points_increase(self) -> Findings:
         places: Any = self.points
         lines = places.items() if isinstance(places, dict) else [("", places)]  # of several lines by name
         expected, fix = "arc lengths that increase strictly, in m", "sort them and drop duplicates"
         for name, x in lines:
             if isinstance(x, tuple) and not _increasing(x):
-                refuse([Finding(("points", name) if name else ("points",), expected, fix)])
-        return self
+                yield [Finding(("points", name) if name else ("points",), expected, fix)]
 
 
 # --- how accurately: a part (`1%`) or a size with its unit (`3 cm`, `50 N`), for named outputs ------------
@@ -577,8 +566,7 @@ class Accuracy(Table):
         "that do not converge); absent: extremes and standard deviations are judged there",
     )
 
-    @model_validator(mode="after")
-    def _units_fit(self) -> Accuracy:
+    def _check_units_fit(self) -> Findings:
         found = []
         for name in ("position", "tension"):
             text = getattr(self, name)
@@ -593,8 +581,7 @@ class Accuracy(Table):
         if {getattr(self, name) for name in ("all", "position", "tension", *ALONG)} <= {None, NOT_ASKED}:
             names = f"all, position, tension, {', '.join(ALONG[:-1])} or {ALONG[-1]}"
             found.append(Finding((), names, "accuracy: 1% stands for {all: 1%}"))
-        refuse(found)
-        return self
+        yield found
 
 
 def of_length(text: str) -> str | dict[str, str]:

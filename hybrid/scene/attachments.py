@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import AliasChoices, Field, model_validator
+from pydantic import AliasChoices, Field
 
 from hybrid.scene.base import (
     After,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     NonNegativePair,
@@ -79,10 +80,8 @@ class Float(Hung):
     def volume_in(self, density: float, gravity: float) -> float:
         return _volume_in(self, density, gravity)
 
-    @model_validator(mode="after")
-    def _one_measure(self) -> Float:
-        _either(self)
-        return self
+    def _check_one_measure(self) -> Findings:
+        return _either(self)
 
 
 class Weight(Hung):
@@ -118,11 +117,9 @@ class Spread(Table):
 
     range: NonNegativePair = Field(description="[from, to], the arc lengths between which it sits [m]")
 
-    @model_validator(mode="after")
-    def _is_a_stretch(self) -> Self:
+    def _check_is_a_stretch(self) -> Findings:
         if self.range[0] >= self.range[1]:
-            refuse([Finding(("range",), "two arc lengths, the smaller first, in m", "write [from, to]")])
-        return self
+            yield [Finding(("range",), "two arc lengths, the smaller first, in m", "write [from, to]")]
 
 
 class Modules(Spread):
@@ -151,10 +148,8 @@ class Modules(Spread):
         """Displaced volume per length [m^3/m] in a fluid of `density` [kg/m^3] under `gravity` [m/s^2]."""
         return _volume_in(self, density, gravity)
 
-    @model_validator(mode="after")
-    def _one_measure(self) -> Modules:
-        _either(self)
-        return self
+    def _check_one_measure(self) -> Findings:
+        return _either(self)
 
 
 StiffnessRow = Annotated[tuple[NonNegative, NonNegative], Field(description="[m from the start of the range, N m^2]")]
@@ -220,25 +215,23 @@ class BendStiffener(Spread):
                 return low + (high - low) * (x - a) / (b - a)
         return self.added_stiffness[-1][1]
 
-    @model_validator(mode="after")
-    def _one_description(self) -> BendStiffener:
+    def _check_one_description(self) -> Findings:
         cone = {"diameters": "m, at both ends", "bore": "m", "modulus": "Pa"}
         if self.added_stiffness is not None:
             given = [key for key in (*cone, "density") if getattr(self, key) is not None]
             if given:
                 why = "nothing, because added_stiffness says how stiff it is"
-                refuse([Finding((given[0],), why, "leave one of the two out; modules over the same range have mass")])
+                yield [Finding((given[0],), why, "leave one of the two out; modules over the same range have mass")]
             self._rows_cover_the_range()
-            return self
+            return
         missing = [Finding((key,), f"a number ({unit}), or added_stiffness", f"add `{key}: ...` ({unit})")
                    for key, unit in cone.items() if getattr(self, key) is None]  # fmt: skip
         if missing:
-            refuse(missing)
+            yield missing
         assert self.diameters is not None and self.bore is not None
         if min(self.diameters) < self.bore:
             expected = f"at least the bore, {self.bore:g} m, at both ends"
-            refuse([Finding(("diameters",), expected, "give outer diameters, in m")])
-        return self
+            yield [Finding(("diameters",), expected, "give outer diameters, in m")]
 
     def _rows_cover_the_range(self) -> None:
         rows, length = self.added_stiffness or (), self.range[1] - self.range[0]
@@ -256,13 +249,13 @@ def _volume_in(attachment: Float | Modules, density: float, gravity: float) -> f
     return (attachment.buoyancy / gravity + attachment.mass) / density
 
 
-def _either(attachment: Float | Modules) -> None:
+def _either(attachment: Float | Modules) -> Findings:
     per = "/m" if isinstance(attachment, Modules) else ""
     both = f"buoyancy (N{per}, net) or volume (m^3{per})"
     if attachment.buoyancy is not None and attachment.volume is not None:
-        refuse([Finding(("volume",), f"either {both}, not both", "leave one of them out")])
+        yield [Finding(("volume",), f"either {both}, not both", "leave one of them out")]
     if attachment.buoyancy is None and attachment.volume is None:
-        refuse([Finding(("buoyancy",), both, f"add `buoyancy: ...` (N{per}), the weight displaced minus its own")])
+        yield [Finding(("buoyancy",), both, f"add `buoyancy: ...` (N{per}), the weight displaced minus its own")]
 
 
 class BendRestrictor(Spread):

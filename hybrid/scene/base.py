@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, Self, get_args, get_origin
 
 from pydantic import (
     AliasChoices,
@@ -31,6 +31,7 @@ from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     ValidationError,
+    model_validator,
 )
 from pydantic.fields import ComputedFieldInfo, FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -89,6 +90,8 @@ class Table(BaseModel):
     instead: ClassVar[Mapping[str, str]] = {}  # of keys that other tables have and this one cannot: what to do
     # Of keys that are no more, the value at which they asked for nothing: results of before 0.7 name every key.
     asked_nothing: ClassVar[Mapping[str, Any]] = {}
+    # Of a table and its bases the methods called _check..: each yields groups of findings, of which the first refuses.
+    checks: ClassVar[tuple[Callable[[Any], Any], ...]] = ()
     bases_last: ClassVar[bool] = False  # whether the keys of its bases come behind those of a table
 
     @classmethod
@@ -100,6 +103,8 @@ class Table(BaseModel):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        known = {name: x for base in reversed(cls.__mro__) for name, x in vars(base).items()}
+        cls.checks = tuple(x for name, x in known.items() if name.startswith("_check"))
         if cls.bases_last:
             order = dict.fromkeys(name for base in cls.__mro__ for name in inspect.get_annotations(base))
             for name in (x for x in order if x in cls.model_fields):
@@ -114,6 +119,13 @@ class Table(BaseModel):
         }
         for old, name in cls.former.items():
             FORMER_NAMES.setdefault(name, set()).add(old)
+
+    @model_validator(mode="after")
+    def _judged(self) -> Self:
+        for check in self.checks:
+            for findings in check(self):
+                refuse(findings)
+        return self
 
     if not TYPE_CHECKING:
 
@@ -172,6 +184,9 @@ class Finding:
     expected: str
     fix: str = ""
     given: str | None = None
+
+
+Findings = Iterator[Iterable[Finding]]  # groups, of which the first that is not empty refuses
 
 
 def refuse(findings: Iterable[Finding]) -> None:

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from hybrid.scene.base import (
     Before,
     Direction,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     Number,
@@ -27,7 +28,6 @@ from hybrid.scene.base import (
     Whole,
     Words,
     numbers,
-    refuse,
     turned,
     unit,
     unwrap,
@@ -127,8 +127,7 @@ class BodyShape(Table):
     stiffness: Positive | None = Field(default=None, description=_STIFFNESS)
     damping: NonNegative = Field(default=0.0, description=_DAMPING)
 
-    @model_validator(mode="after")
-    def _has_what_its_kind_has(self) -> Self:
+    def _check_has_what_its_kind_has(self) -> Findings:
         found = []
         for key in (*_EXAMPLES, "rotation"):
             given, has = getattr(self, key) is not None, key in _KEYS[self.kind]
@@ -138,10 +137,9 @@ class BodyShape(Table):
                 found.append(Finding((key,), expected, f"leave it out, or kind: {other}"))
             elif has and not given:
                 found.append(Finding((key,), f"the {key} of the {self.kind}", _EXAMPLES[key], "nothing"))
-        refuse(found)
+        yield found
         if self.size is not None and self.rounding is not None:
-            refuse(rounded_within(self.size, self.rounding))
-        return self
+            yield rounded_within(self.size, self.rounding)
 
     @property
     def across(self) -> float:
@@ -258,11 +256,9 @@ class Member(Table):
         default=10, description="pieces into which it is cut; each feels the water at its middle [-]"
     )
 
-    @model_validator(mode="after")
-    def _has_a_length(self) -> Member:
+    def _check_has_a_length(self) -> Findings:
         if math.dist(self.start, self.end) < 1e-6 * self.diameter:
-            refuse([Finding(("end",), "a place other than that of the start", "move one of the two")])
-        return self
+            yield [Finding(("end",), "a place other than that of the start", "move one of the two")]
 
 
 class Hydrostatics(Table):
@@ -295,16 +291,14 @@ class FixedBody(Table):
         """The motion of the body without its rotations, as far as tables give it."""
         return None if self.motion is None or self.motion.file is not None else without_turns(self.motion)
 
-    @model_validator(mode="after")
-    def _fairleads_are_points(self) -> FixedBody:
+    def _check_fairleads_are_points(self) -> Findings:
         vessel = self.motion.vessel if self.motion is not None else None
         if vessel is not None and vessel.rao is None:
             expected = "nothing, because `file` is of the body itself: place of its origin and its rotation"
-            refuse([Finding(("motion", "vessel"), expected, "leave it out")])
+            yield [Finding(("motion", "vessel"), expected, "leave it out")]
         if vessel is not None and vessel.fairlead is not None:
             expected = "nothing, because lines end at points of kind fairlead"
-            refuse([Finding(("motion", "vessel", "fairlead"), expected, "leave it out")])
-        return self
+            yield [Finding(("motion", "vessel", "fairlead"), expected, "leave it out")]
 
 
 class HeldBody(FixedBody):
@@ -390,21 +384,18 @@ class FreeBody(Table):
             M = [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(M, self.added_mass, strict=True)]
         return M
 
-    @model_validator(mode="after")
-    def _floats_or_is_submerged(self) -> FreeBody:
+    def _check_floats_or_is_submerged(self) -> Findings:
         if self.volume and self.hydrostatics is not None:
             expected = "nothing, because hydrostatics holds the buoyancy of a body that floats"
-            refuse([Finding(("volume",), expected, "leave it out, or leave hydrostatics out")])
-        return self
+            yield [Finding(("volume",), expected, "leave it out, or leave hydrostatics out")]
 
-    @model_validator(mode="after")
-    def _matrices_are_possible(self) -> FreeBody:
+    def _check_matrices_are_possible(self) -> Findings:
         most, rest = max(self.inertia), sum(self.inertia) - max(self.inertia)
         if most > rest * (1.0 + 1e-9):
             expected = (
                 f"moments of which none is more than the other two together; {most:g} is more than {rest:g} kg m^2"
             )
-            refuse([Finding(("inertia",), expected, "check which axis is which, and the units")])
+            yield [Finding(("inertia",), expected, "check which axis is which, and the units")]
         for key, given_in in (("added_mass", "kg"), ("damping", "N s/m")):
             matrix: Matrix | None = getattr(self, key)
             if matrix is None:
@@ -414,16 +405,15 @@ class FreeBody(Table):
             if key == "added_mass" and worst[0] > SYMMETRIC * big:
                 _, i, j = worst
                 expected = f"a symmetric matrix; here row {i + 1}, column {j + 1} and its mirror image differ"
-                refuse([Finding((key, i, j), expected, f"{matrix[j][i]:g} ({given_in}), or the mean of both")])
+                yield [Finding((key, i, j), expected, f"{matrix[j][i]:g} ({given_in}), or the mean of both")]
             even = [[0.5 * (matrix[i][j] + matrix[j][i]) for j in range(6)] for i in range(6)]
             if key == "damping" and no_pivot(even, -1e-9):
                 expected = "a matrix that takes energy, whatever the velocity: no negative eigenvalue"
-                refuse([Finding((key,), expected, "check signs and units", "a matrix that gives energy")])
+                yield [Finding((key,), expected, "check signs and units", "a matrix that gives energy")]
         if no_pivot(self.mass_matrix, 1e-12):
             expected = "a matrix that leaves, with the mass, some inertia to every motion"
             given = "a matrix that leaves none"
-            refuse([Finding(("added_mass",), expected, "check signs, units and the order surge to yaw", given)])
-        return self
+            yield [Finding(("added_mass",), expected, "check signs, units and the order surge to yaw", given)]
 
 
 def _placed(origin: Triple, rotation: Triple, place: Triple) -> Triple:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag
 
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import (
     Finding,
+    Findings,
     NonNegative,
     NonNegativePair,
     Number,
@@ -67,17 +68,15 @@ class Fluid(Table):
         points = current.table if isinstance(current, CurrentProfile) else current
         return any(any(p.flow) if isinstance(p, CurrentPoint) else p != 0.0 for p in points)
 
-    @model_validator(mode="after")
-    def _levels(self) -> Fluid:
+    def _check_levels(self) -> Findings:
         if self.waves is not None and self.surface is None:
-            refuse([Finding(("surface",), "a number, in m, because waves need a surface", "add `surface: 0` (m)")])
+            yield [Finding(("surface",), "a number, in m, because waves need a surface", "add `surface: 0` (m)")]
         current = self.current
         if isinstance(current, PowerLawCurrent) and current.bottom >= current.top_under(self.surface):
             top = "the surface" if self.surface is not None else "the top, 0 m without a surface"
             expected = f"a height below {current.top_under(self.surface):.8g} m, {top}"
             fix = "z points up; heights below the surface are negative"
-            refuse([Finding(("current", "bottom"), expected, fix)])
-        return self
+            yield [Finding(("current", "bottom"), expected, fix)]
 
 
 class Environment(Table):
@@ -140,12 +139,10 @@ class Vortices(Table):
     )
     ramp: NonNegative = Field(default=0.0, description="time over which the lift grows at the start; 0: at once [s]")
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Vortices:
+    def _check_in_order(self) -> Findings:
         if not self.low < self.center < self.high:
             expected = f"a number between low, {self.low:g}, and high, {self.high:g}"
-            refuse([Finding(("center",), expected, "is low above high, or center beyond one of them?")])
-        return self
+            yield [Finding(("center",), expected, "is low above high, or center beyond one of them?")]
 
 
 class Damping(Table):
@@ -482,18 +479,15 @@ class Section(Table):
             return min(slopes(self.moment_curvature))
         return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness
 
-    @model_validator(mode="after")
-    def _turns_about_its_axis_too(self) -> Section:
+    def _check_turns_about_its_axis_too(self) -> Findings:
         if isinstance(self.rotary_inertia, tuple) and self.rotary_inertia[0] > 0.0 == self.rotary_inertia[1]:
             expected = "a number > 0, in kg m: no section turns across its axis with inertia and about it without"
             fix = f"twice the transverse one, that of a round section: {2.0 * self.rotary_inertia[0]:g}"
-            refuse([Finding(("rotary_inertia", 1), expected, fix)])
-        return self
+            yield [Finding(("rotary_inertia", 1), expected, fix)]
 
-    @model_validator(mode="after")
-    def _tension_twists(self) -> Section:
+    def _check_tension_twists(self) -> Findings:
         if not self.tension_torque:
-            return self
+            return
         missing = [
             Finding((key,), f"a number > 0, in {unit}, because tension_torque {why}", f"add `{key}: ...` ({unit})")
             for key, unit, why in (
@@ -507,13 +501,11 @@ class Section(Table):
             expected = f"at most the diameter, {most:g} m in size: the armour lies within it, and 0.1 of it is much"
             missing.append(Finding(("tension_torque",), expected, "is it in N mm per N? then divide it by 1000"))
         if missing:
-            refuse(missing)
-        return self
+            yield missing
 
-    @model_validator(mode="after")
-    def _density_is_possible(self) -> Section:
+    def _check_density_is_possible(self) -> Findings:
         if self.diameter is None:
-            return self
+            return
         area = 0.25 * math.pi * self.diameter**2
         density, (least, most) = self.mass / area, SECTION_DENSITIES
         if not least <= density <= most:
@@ -521,37 +513,34 @@ class Section(Table):
                 f"{least * area:.3g} to {most * area:.3g} kg/m with a diameter of {self.diameter:g} m: a mean density "
                 f"of {least:g} to {most:g} kg/m^3; this one is {density:.3g} kg/m^3"
             )
-            refuse([Finding(("mass",), expected, _other_units(density, self.mass, self.diameter))])
-        return self
+            yield [Finding(("mass",), expected, _other_units(density, self.mass, self.diameter))]
 
-    @model_validator(mode="after")
-    def _one_law_of_stretch(self) -> Section:
+    def _check_one_law_of_stretch(self) -> Findings:
         table, dynamic = self.tension_strain, self.dynamic_stiffness
         if table is not None and self.axial_stiffness is not None:
             fix = "leave one of the two out"
-            refuse([Finding(("axial_stiffness",), "nothing, because tension_strain says how it stretches", fix)])
+            yield [Finding(("axial_stiffness",), "nothing, because tension_strain says how it stretches", fix)]
         if table is not None:
             refuse_rows(table, "tension_strain")
         if self.creep is not None and self.syrope is not None:
-            refuse([Finding(("creep",), "nothing, because the curves of syrope have it", "leave creep out")])
+            yield [Finding(("creep",), "nothing, because the curves of syrope have it", "leave creep out")]
         if self.creep is not None and self.curve is None:
             expected = "an axial_stiffness or tension_strain beside it: what does not stretch does not creep"
-            refuse([Finding(("creep",), expected, "add `axial_stiffness: ...` (N)")])
+            yield [Finding(("creep",), expected, "add `axial_stiffness: ...` (N)")]
         if self.syrope is not None:
             self._remembers(self.syrope)
-            return self
+            return
         if dynamic is None:
-            return self
+            return
         if self.curve is None:
             expected = "an axial_stiffness, tension_strain or syrope beside it, the static one"
-            refuse([Finding(("dynamic_stiffness",), expected, "add `axial_stiffness: ...` (N)")])
+            yield [Finding(("dynamic_stiffness",), expected, "add `axial_stiffness: ...` (N)")]
         else:
             stiffest = max(slopes(self.curve))
             if not dynamic.constant > stiffest:
                 expected = f"more than the largest static stiffness, {stiffest:.6g} N"
                 fix = "a rope answers stiffer to what is fast; are the two exchanged?"
-                refuse([Finding(("dynamic_stiffness", "constant"), expected, fix)])
-        return self
+                yield [Finding(("dynamic_stiffness", "constant"), expected, fix)]
 
     def _remembers(self, syrope: Syrope) -> None:
         """Refuse what does not go with curves that depend on the highest mean tension."""
@@ -569,19 +558,16 @@ class Section(Table):
             fault = syrope.first_fault(self.dynamic_stiffness)
             refuse([fault[1]] if fault is not None else [])
 
-    @model_validator(mode="after")
-    def _one_law_of_bending(self) -> Section:
+    def _check_one_law_of_bending(self) -> Findings:
         if self.moment_curvature is None:
-            return self
+            return
         if self.bending_stiffness is not None:
             fix = "leave one of the two out"
-            refuse([Finding(("bending_stiffness",), "nothing, because moment_curvature says how it bends", fix)])
+            yield [Finding(("bending_stiffness",), "nothing, because moment_curvature says how it bends", fix)]
         found = bending_findings(self.moment_curvature)
-        refuse(Finding(("moment_curvature", *x.at), x.expected, x.fix, x.given) for x in found)
-        return self
+        yield (Finding(("moment_curvature", *x.at), x.expected, x.fix, x.given) for x in found)
 
-    @model_validator(mode="after")
-    def _layers_slip(self) -> Section:
+    def _check_layers_slip(self) -> Findings:
         found: list[Finding] = []
         if self.first_loading:
             found += first_loading_findings(self.moment_curvature)
@@ -592,50 +578,40 @@ class Section(Table):
             left = "when all layers of bending_slip slip" if self.bending_slip else "without tension"
             expected = f"a number > 0, in N m^2: what is left {left}"
             found.append(Finding(("bending_stiffness",), expected, "add `bending_stiffness: ...` (N m^2)"))
-        refuse(found)
-        return self
+        yield found
 
-    @model_validator(mode="after")
-    def _limits_leave_room(self) -> Section:
+    def _check_limits_leave_room(self) -> Findings:
         if self.min_tension is not None and self.max_tension is not None and self.min_tension >= self.max_tension:
             expected = f"a tension below max_tension, {self.max_tension:g} N"
-            refuse([Finding(("min_tension",), expected, "are the two exchanged?")])
-        return self
+            yield [Finding(("min_tension",), expected, "are the two exchanged?")]
 
-    @model_validator(mode="after")
-    def _capacity_goes_round(self) -> Section:
+    def _check_capacity_goes_round(self) -> Findings:
         found = capacity_findings(self.capacity) if self.capacity is not None else []
-        refuse(Finding(("capacity", *x.at), x.expected, x.fix, x.given) for x in found)
-        return self
+        yield (Finding(("capacity", *x.at), x.expected, x.fix, x.given) for x in found)
 
-    @model_validator(mode="after")
-    def _code_has_what_it_checks(self) -> Section:
+    def _check_code_has_what_it_checks(self) -> Findings:
         if self.code is not None:
-            refuse(Finding(("code", *x.at), x.expected, x.fix, x.given) for x in self.code.findings())
+            yield (Finding(("code", *x.at), x.expected, x.fix, x.given) for x in self.code.findings())
         if isinstance(self.code, RiserCode) and self.pipe is None:
-            refuse([Finding(("pipe",), "the wall that DNV-OS-F201 checks", "add `pipe: {wall: ...}` (m)")])
-        return self
+            yield [Finding(("pipe",), "the wall that DNV-OS-F201 checks", "add `pipe: {wall: ...}` (m)")]
 
-    @model_validator(mode="after")
-    def _pipe_fits(self) -> Section:
+    def _check_pipe_fits(self) -> Findings:
         if self.pipe is None:
-            return self
+            return
         given = self.pipe.outer_diameter
         outer = given if given is not None else self.diameter
         if outer is None:
             fix = "add `outer_diameter: ...` (m), or a diameter of the section"
-            refuse([Finding(("pipe", "outer_diameter"), "a number, in m", fix, "nothing")])
+            yield [Finding(("pipe", "outer_diameter"), "a number, in m", fix, "nothing")]
         assert outer is not None
         if given is not None and self.diameter is not None and given > self.diameter * (1.0 + 1e-9):
             expected = f"at most the diameter of the section, {self.diameter:g} m, coatings included"
-            refuse([Finding(("pipe", "outer_diameter"), expected, "check both diameters (m)")])
+            yield [Finding(("pipe", "outer_diameter"), expected, "check both diameters (m)")]
         if 2.0 * self.pipe.wall >= outer:
             expected = f"less than half the outer diameter, {0.5 * outer:g} m"
-            refuse([Finding(("pipe", "wall"), expected, "wall is in m, one wall alone")])
-        return self
+            yield [Finding(("pipe", "wall"), expected, "wall is in m, one wall alone")]
 
-    @model_validator(mode="after")
-    def _frame_needs_torsion(self) -> Section:
+    def _check_frame_needs_torsion(self) -> Findings:
         reason = ""
         if self.anisotropic:
             reason = "two different bending stiffnesses"
@@ -643,8 +619,7 @@ class Section(Table):
             reason = "intrinsic_curvature"
         if reason and self.torsional_stiffness is None:
             expected = f"a number, in N m^2, because with {reason} the twist of the cable matters"
-            refuse([Finding(("torsional_stiffness",), expected, "add `torsional_stiffness: ...` (N m^2)")])
-        return self
+            yield [Finding(("torsional_stiffness",), expected, "add `torsional_stiffness: ...` (N m^2)")]
 
 
 class Cable(Table):

@@ -13,13 +13,14 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
-from pydantic import AliasChoices, Field, PrivateAttr, model_validator
+from pydantic import AliasChoices, Field, PrivateAttr
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape, sphere_diameter
 from hybrid.scene.base import (
     Before,
     Direction,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     Number,
@@ -114,28 +115,26 @@ class Payout(Table):
         "that is prescribed [m]",
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Payout:
+    def _check_one_source(self) -> Findings:
         given = [name for name in SOURCES if getattr(self, name) is not None]
         fix = f"keep {given[0]}, or leave it out" if given else ""
-        refuse(Finding((name,), f"nothing, because {given[0]} already gives the length", fix) for name in given[1:])
+        yield (Finding((name,), f"nothing, because {given[0]} already gives the length", fix) for name in given[1:])
         if self.rate is not None:
             if self.ramp is None and self.rate != 0.0:
                 expected = "a number > 0, in s, because a rate that jumps would be an impact"
-                refuse([Finding(("ramp",), expected, "add `ramp: ...` (s), such as 5")])
+                yield [Finding(("ramp",), expected, "add `ramp: ...` (s), such as 5")]
             if self.until is not None and self.until < self.begin + (self.ramp or 0.0):
                 expected = f"a time not before begin + ramp, {self.begin + (self.ramp or 0.0):g} s"
-                refuse([Finding(("until",), expected, "a later time, or a shorter ramp")])
+                yield [Finding(("until",), expected, "a later time, or a shorter ramp")]
         else:
             words = [("ramp", self.ramp), ("until", self.until), ("begin", self.begin or None)]
             fix = "give rate, or leave it out"
-            refuse(Finding((name,), "nothing, because it is for rate", fix) for name, x in words if x is not None)
+            yield (Finding((name,), "nothing, because it is for rate", fix) for name, x in words if x is not None)
         if self.winch is not None and self.longest is None:
             expected = "the longest length that may be out, in m, because the winch pays out as much as it must"
-            refuse([Finding(("longest",), expected, "add `longest: ...` (m)")])
+            yield [Finding(("longest",), expected, "add `longest: ...` (m)")]
         for name in ("rates", "lengths"):
             self._rows_increase(name)
-        return self
 
     @property
     def from_outside(self) -> bool:
@@ -177,12 +176,10 @@ class Release(Table):
         default=None, description="force between the end and what holds it at which it is let go [N]"
     )
 
-    @model_validator(mode="after")
-    def _says_when(self) -> Release:
+    def _check_says_when(self) -> Findings:
         if self.time is None and self.tension is None:
             fix = "time: 12 (s) or tension: 50e3 (N), or leave release_at out"
-            refuse([Finding((), "time or tension", fix)])
-        return self
+            yield [Finding((), "time or tension", fix)]
 
 
 BEND_STIFFNESS = (
@@ -311,13 +308,11 @@ class EndTable(Table):
         """Whether a tangent is held or a moment given: a cable that ends in a catenary transmits neither."""
         return self.held_tangent is not None or any(load.what == "moment" for load in self.loads)
 
-    @model_validator(mode="after")
-    def _normal_is_across(self) -> Self:
+    def _check_normal_is_across(self) -> Findings:
         tangent, normal = self.held_tangent, self.held_normal
         if tangent is not None and normal is not None and parallel(tangent, normal):
             expected = "a direction across the tangent; this one is parallel to it"
-            refuse([Finding(("normal",), expected, "any direction not along the tangent will do")])
-        return self
+            yield [Finding(("normal",), expected, "any direction not along the tangent will do")]
 
 
 class Pinned(EndTable):
@@ -331,13 +326,11 @@ class Pinned(EndTable):
     payout: Payout | None = Field(default=None, description=PAYOUT)
     release_at: Release | None = Field(default=None, description=_RELEASE)
 
-    @model_validator(mode="after")
-    def _turning_is_free(self) -> Pinned:
+    def _check_turning_is_free(self) -> Findings:
         if self.motion is not None:
             turns = [name for name in self.motion.harmonics() if name in TURNS]
             expected = "no rotation, because a pinned end turns freely"
-            refuse(Finding(("motion", name), expected, "kind: clamped can be turned") for name in turns)
-        return self
+            yield (Finding(("motion", name), expected, "kind: clamped can be turned") for name in turns)
 
 
 class Clamped(EndTable):
@@ -362,12 +355,10 @@ class Clamped(EndTable):
     def spring(self) -> float:
         return math.inf if self.bend_stiffness is None else self.bend_stiffness
 
-    @model_validator(mode="after")
-    def _something_is_held(self) -> Clamped:
+    def _check_something_is_held(self) -> Findings:
         if self.swivel and self.bend_stiffness == 0.0:
             expected = "false, because with bend_stiffness 0 nothing is left that is held"
-            refuse([Finding(("swivel",), expected, "write kind: pinned, without a tangent: it turns freely")])
-        return self
+            yield [Finding(("swivel",), expected, "write kind: pinned, without a tangent: it turns freely")]
 
 
 class Guided(EndTable):
@@ -386,10 +377,8 @@ class Guided(EndTable):
     def holds_twist(self) -> bool:
         return self.normal is not None
 
-    @model_validator(mode="after")
-    def _only_turns(self) -> Guided:
-        refuse(moved_guides(self.motion))
-        return self
+    def _check_only_turns(self) -> Findings:
+        yield moved_guides(self.motion)
 
 
 def moved_guides(motion: Motion | None) -> Iterator[Finding]:
@@ -426,13 +415,11 @@ class Body(EndTable):
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     thrust: Loading | None = Field(default=None, description="force of its propellers, inertial frame [N]")
 
-    @model_validator(mode="after")
-    def _is_something(self) -> Body:
+    def _check_is_something(self) -> Findings:
         if not (self.mass or self.volume or self.drag_area):
-            refuse(
+            yield (
                 [Finding(("mass",), "a number > 0, in kg", "give its mass, or `kind: free` for an end without a body")]
             )
-        return self
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3], whatever the fluid."""

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import chain
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -26,8 +28,9 @@ from hybrid.scene.motion_file import (
     read_history,
     read_record,
     shortest_in,
+    unreadable,
 )
-from hybrid.scene.motion_tables import SHIFTS, GivenLoad, Harmonic, Motion, Row, Vessel
+from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Row, Vessel
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.sea_checks import deepest_place
 
@@ -385,26 +388,15 @@ def load_findings(ends: Ends, step: float | None) -> Iterator[Finding]:
     """What is wrong with the histories of loads; step: s, if steps are fixed."""
     for name, end in ends.named().items():
         for load in end.loads:
-            found = _unreadable(load)
-            if found is not None:
+            file = load.load.file
+            for found in () if file is None else chain(*unreadable(file, partial(read_history, file))):
                 yield Finding(("ends", name, *load.key[:-1], *found.at), found.expected, found.fix, found.given)
-            elif step is not None and load.rows:
+            if step is not None and load.rows:
                 t = _missed(load.rows, step)
                 if t is not None:
                     where = dotted(("ends", name, *load.key))
                     expected = f"steps so short that {where} is nearly straight within each; it turns at t = {t:g} s"
                     yield Finding(("time", "step"), expected, "a smaller step, or a smoother history", f"{step:g}")
-
-
-def _unreadable(load: GivenLoad) -> Finding | None:
-    """Why the file of a load cannot be used."""
-    if load.load.file is None:
-        return None
-    try:
-        read_history(load.load.file)
-    except RecordRefused as refused:
-        return refused.finding
-    return None
 
 
 def _missed(rows: Sequence[Row], step: float) -> float | None:

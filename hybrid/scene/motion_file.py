@@ -7,7 +7,6 @@ import os
 import stat
 from array import array
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, wraps
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import ResultError, command_for, optional_package
-from hybrid.scene.base import Finding, refuse
+from hybrid.scene.base import Finding, Findings
 
 Array = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -243,14 +242,13 @@ def check_file(path: str | Path, what: str = "a CSV file") -> os.stat_result:
     return status
 
 
-@contextmanager
-def readable(path: str, what: str = "a CSV file") -> Iterator[None]:
-    """What is read of a file of a table, within, is refused with what is wrong with the file, if anything is."""
+def unreadable(path: str, read: Callable[[], Any], what: str = "a CSV file") -> Findings:
+    """What is wrong with a file that a table names; read: what is made of it."""
     try:
         check_file(path, what)
-        yield
+        read()
     except RecordRefused as refused:
-        refuse([refused.finding])
+        yield [refused.finding]
 
 
 def _table(

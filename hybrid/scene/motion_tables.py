@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from hybrid.scene.base import (
     Before,
     Finding,
+    Findings,
     NonNegative,
     Number,
     Positive,
@@ -26,7 +27,6 @@ from hybrid.scene.base import (
     Vector,
     Words,
     numbers,
-    refuse,
     table_or_list,
     value_or_table,
 )
@@ -59,20 +59,18 @@ class Load(Table):
         description="time over which it grows from nothing; absent: at once, or with a tangent that is turned in [s]",
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Load:
+    def _check_one_source(self) -> Findings:
         given = [name for name in ("value", "history", "file") if getattr(self, name) is not None]
         if not given:
             fix = "value: [x, y, z] for a constant load, history: [[t, x, y, z], ...] or file for one that changes"
-            refuse([Finding((), "value, history or file", fix)])
+            yield [Finding((), "value, history or file", fix)]
         fix = f"keep {given[0]}, or leave it out"
-        refuse(Finding((name,), f"nothing, because {given[0]} already gives the load", fix) for name in given[1:])
+        yield (Finding((name,), f"nothing, because {given[0]} already gives the load", fix) for name in given[1:])
         for k, (one, other) in enumerate(pairwise(self.history or ()), start=1):
             if not other[0] > one[0]:
                 expected = f"a time after that of the row before, {one[0]:g} s"
                 fix = "sort the rows; for a sudden change give two rows a time step apart"
-                refuse([Finding(("history", k, 0), expected, fix)])
-        return self
+                yield [Finding(("history", k, 0), expected, fix)]
 
 
 Loading = Annotated[
@@ -287,8 +285,7 @@ class Motion(_Harmonics):
             ways.append((self.travel.by, grown, rate / self.travel.over))
         return _sum([(v, far) for v, far, _ in ways]), _sum([(v, fast) for v, _, fast in ways])
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Motion:
+    def _check_one_source(self) -> Findings:
         given = [*self.shifts(), *(name for name in TURNS if getattr(self, name) is not None)]
         ramped = [name for name in given if name not in ("travel", "follow", "vessel")]
         if self.vessel is not None and self.file is not None:
@@ -297,29 +294,28 @@ class Motion(_Harmonics):
             ]
             extra += [(name,) for name in given if name != "vessel"]
             fix = "put the whole motion of the vessel into the file, or leave file out"
-            refuse(Finding(x, "nothing, because file gives the motion of the vessel", fix) for x in extra)
-            return self
+            yield (Finding(x, "nothing, because file gives the motion of the vessel", fix) for x in extra)
+            return
         if self.vessel is not None and self.vessel.rao is None:
             fix = "give rao, or `file` beside vessel with t,x,y,z,roll,pitch,yaw"
-            refuse([Finding(("vessel", "rao"), "a CSV file or a dataset of Capytaine", fix)])
+            yield [Finding(("vessel", "rao"), "a CSV file or a dataset of Capytaine", fix)]
         if self.vessel is not None:
             fix = "leave it out, or write all of the motion into a file; travel may move the vessel"
             beside = [name for name in given if name not in ("vessel", "travel")]
-            refuse(Finding((name,), "nothing, because vessel already gives the motion", fix) for name in beside)
+            yield (Finding((name,), "nothing, because vessel already gives the motion", fix) for name in beside)
         if self.file is not None:
             fix = "put the whole motion into the file, or leave file out"
-            refuse(Finding((name,), "nothing, because file already gives the motion", fix) for name in given)
+            yield (Finding((name,), "nothing, because file already gives the motion", fix) for name in given)
         elif not given:
             expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, velocity, travel, follow, vessel, or file"
-            refuse([Finding((), expected, "say how the end moves, or leave motion out")])
+            yield [Finding((), expected, "say how the end moves, or leave motion out")]
         elif self.ramp is not None and not ramped:
             expected = "nothing, because a ramp is for velocity and for harmonic motion"
             fix = "leave it out: travel has `over`, and what follows the waves grows with waves.ramp"
-            refuse([Finding(("ramp",), expected, fix)])
+            yield [Finding(("ramp",), expected, fix)]
         if self.velocity is not None and any(self.velocity) and self.ramp is None:
             expected = "a number > 0, in s, because the cable starts at rest and velocity has to grow from zero"
-            refuse([Finding(("ramp",), expected, "add `ramp: ...` (s), such as 10")])
-        return self
+            yield [Finding(("ramp",), expected, "add `ramp: ...` (s), such as 10")]
 
 
 # Where what is driven is, as far as tables say it (travel, velocity and harmonic motion), and when it is farthest.

@@ -7,16 +7,17 @@ import re
 from collections.abc import Iterator
 from operator import mul
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hybrid.scene.base import (
     Before,
     Direction,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     Number,
@@ -26,11 +27,10 @@ from hybrid.scene.base import (
     Vector,
     Words,
     numbers,
-    refuse,
     turned,
     unit,
 )
-from hybrid.scene.motion_file import LARGEST, RecordRefused, read_once, readable
+from hybrid.scene.motion_file import LARGEST, RecordRefused, read_once, unreadable
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.points import Name
 
@@ -72,12 +72,14 @@ class _Obstacle(Table):
         default=False, description="whether it is moved step by step by `Simulation.set_obstacle`; it rests until it is"
     )
 
-    @model_validator(mode="after")
-    def _moves_once(self) -> Self:
+    def _check_moves_once(self) -> Findings:
         if self.from_outside and self.motion is not None:
             fix = "leave out the one or the other"
-            refuse([Finding(("motion",), "nothing, because the obstacle is set from outside", fix)])
-        return self
+            yield [Finding(("motion",), "nothing, because the obstacle is set from outside", fix)]
+
+    def distance(self, x: tuple[float, float, float]) -> float:
+        """Distance [m] of a place to the surface; negative within the solid."""
+        raise NotImplementedError
 
     @property
     def moves(self) -> bool:
@@ -93,7 +95,6 @@ class PlaneObstacle(_Obstacle):
     normal: Direction = Field(description="direction out of the solid, towards the line; any length [-]")
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         return sum(n * (a - b) for n, a, b in zip(unit(self.normal), x, self.at, strict=True))
 
 
@@ -105,7 +106,6 @@ class SphereObstacle(_Obstacle):
     radius: Positive = Field(description="radius [m]")
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         return math.dist(x, self.at) - self.radius
 
 
@@ -120,11 +120,9 @@ class _Turning(_Obstacle):
         default=None, description="inertia and bearing with which it turns freely, as a sheave; absent: not at all"
     )
 
-    @model_validator(mode="after")
-    def _turns_once(self) -> Self:
+    def _check_turns_once(self) -> Findings:
         if self.spin is not None and self.bearing is not None:
-            refuse([Finding(("bearing",), "nothing, because the spin is given", "leave out the one or the other")])
-        return self
+            yield [Finding(("bearing",), "nothing, because the spin is given", "leave out the one or the other")]
 
 
 class CylinderObstacle(_Turning):
@@ -139,7 +137,6 @@ class CylinderObstacle(_Turning):
     )
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         half, a = math.inf if self.length is None else 0.5 * self.length, unit(self.axis)
         w = [p - q for p, q in zip(x, self.at, strict=True)]
         along = min(max(sum(p * q for p, q in zip(w, a, strict=True)), -half), half)
@@ -170,10 +167,8 @@ class BoxObstacle(_Rotated):
     )
     rounding: Positive = Field(description="radius of its edges, at most half of the smallest of `size` [m]")
 
-    @model_validator(mode="after")
-    def _is_round_within_its_size(self) -> Self:
-        refuse(rounded_within(self.size, self.rounding))
-        return self
+    def _check_is_round_within_its_size(self) -> Findings:
+        yield rounded_within(self.size, self.rounding)
 
     @property
     def halves(self) -> tuple[float, float, float]:
@@ -182,7 +177,6 @@ class BoxObstacle(_Rotated):
         return x, y, z
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         w = [p - q for p, q in zip(x, self.at, strict=True)]
         past = [abs(sum(map(mul, w, a))) - half for a, half in zip(self.axes, self.halves, strict=True)]
         return math.hypot(*(max(p, 0.0) for p in past)) + min(max(past), 0.0) - self.rounding
@@ -204,15 +198,12 @@ class TorusObstacle(_Turning):
     ring: Positive = Field(description="radius of the middle of the ring [m]")
     radius: Positive = Field(description="radius of its section, smaller than that of the ring [m]")
 
-    @model_validator(mode="after")
-    def _has_a_hole(self) -> Self:
+    def _check_has_a_hole(self) -> Findings:
         if self.radius >= self.ring:
             expected = f"less than the radius of the ring, {self.ring:g} m"
-            refuse([Finding(("radius",), expected, "a larger `ring`, or a sphere", f"{self.radius:g}")])
-        return self
+            yield [Finding(("radius",), expected, "a larger `ring`, or a sphere", f"{self.radius:g}")]
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         away, along = _about(x, self.at, self.axis)
         return math.hypot(away - self.ring, along) - self.radius
 
@@ -230,7 +221,6 @@ class SheaveObstacle(_Turning):
     rim: Positive = Field(description="radius of the section of its rims, each twice that thick [m]")
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         away, along = _about(x, self.at, self.axis)
         out, along = away - self.radius - self.groove, abs(along)
         if out > 0.0:
@@ -492,14 +482,10 @@ class MeshObstacle(_Rotated):
     at: Vector = Field(description="where the origin of the file is, inertial frame [m]")
     scale: Positive = Field(default=1.0, description="length of a unit of the file: 0.001 for one in millimetres [m]")
 
-    @model_validator(mode="after")
-    def _readable(self) -> Self:
-        with readable(self.file, WHAT):
-            read_mesh(self.file)
-        return self
+    def _check_readable(self) -> Findings:
+        return unreadable(self.file, lambda: read_mesh(self.file), WHAT)
 
     def distance(self, x: tuple[float, float, float]) -> float:
-        """Distance [m] of a place to the surface; negative within the solid."""
         w = [(p - q) / self.scale for p, q in zip(x, self.at, strict=True)]
         u, v, z = (sum(map(mul, w, a)) for a in self.axes)
         return self.scale * distance_to(read_mesh(self.file), (u, v, z))

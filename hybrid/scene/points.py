@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import (
     After,
     Direction,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     Number,
@@ -21,7 +22,6 @@ from hybrid.scene.base import (
     Truth,
     Vector,
     parallel,
-    refuse,
 )
 from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, AtPoint, Body, Free, Payout, moved_guides
 from hybrid.scene.motion_tables import GivenLoad, Loading, Motion, Triple
@@ -58,12 +58,10 @@ class Failure(Table):
     time: Positive | None = Field(default=None, description="time at which it breaks [s]")
     tension: Positive | None = Field(default=None, description="force at which it breaks [N]")
 
-    @model_validator(mode="after")
-    def _says_when(self) -> Failure:
+    def _check_says_when(self) -> Findings:
         if self.time is None and self.tension is None:
             fix = "time: 12 (s) or tension: 50e3 (N), or leave break_at out"
-            refuse([Finding((), "time or tension", fix)])
-        return self
+            yield [Finding((), "time or tension", fix)]
 
 
 class FixedPoint(Table):
@@ -100,13 +98,11 @@ class FreePoint(Table):
         description="moment on a point to which lines are clamped, or on the free end of a rod, inertial frame [N m]",
     )
 
-    @model_validator(mode="after")
-    def _added_mass_has_a_body(self) -> FreePoint:
+    def _check_added_mass_has_a_body(self) -> Findings:
         if self.added_mass and not self.is_body:
-            refuse(
+            yield (
                 [Finding(("added_mass",), "0, because the point has no mass, volume or drag area", "add `volume: ...`")]
             )
-        return self
 
     @property
     def is_body(self) -> bool:
@@ -146,10 +142,8 @@ class GuidedPoint(Table):
         default=None, description="how the direction turns; a guided point takes no translation"
     )
 
-    @model_validator(mode="after")
-    def _only_turns(self) -> GuidedPoint:
-        refuse(moved_guides(self.motion))
-        return self
+    def _check_only_turns(self) -> Findings:
+        yield moved_guides(self.motion)
 
 
 class Fairlead(Table):
@@ -202,17 +196,15 @@ class ClampedConnection(Table):
     bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
     payout: Payout | None = Field(default=None, description=PAYOUT)
 
-    @model_validator(mode="after")
-    def _normal_is_across(self) -> ClampedConnection:
+    def _check_normal_is_across(self) -> Findings:
         if self.normal is not None and self.tangent is None:
-            refuse([Finding(("tangent",), "a direction, because a normal is given", "give the direction of the line")])
+            yield [Finding(("tangent",), "a direction, because a normal is given", "give the direction of the line")]
         if self.normal is not None and self.tangent is not None and parallel(self.tangent, self.normal):
             expected = "a direction across the tangent; this one is parallel to it"
-            refuse([Finding(("normal",), expected, "any direction not along the tangent will do")])
+            yield [Finding(("normal",), expected, "any direction not along the tangent will do")]
         if self.swivel and self.bend_stiffness == 0.0:
             expected = "false, because with bend_stiffness 0 nothing is left that is held"
-            refuse([Finding(("swivel",), expected, "leave the connection out: the line then turns freely")])
-        return self
+            yield [Finding(("swivel",), expected, "leave the connection out: the line then turns freely")]
 
 
 Connection = Annotated[

@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from hybrid.scene.base import (
     Direction,
     Finding,
+    Findings,
     NonNegative,
     NonNegativePair,
     Number,
@@ -20,7 +21,6 @@ from hybrid.scene.base import (
     Text,
     Vector,
     nearest,
-    refuse,
 )
 
 # Kinds: unit, what it is, which keys it needs, which it may have beside `line`, `smallest` and `largest`.
@@ -135,23 +135,21 @@ class Quantity(Table):
         """Where a layback ends: touchdown, or end."""
         return self.to or ("touchdown" if seabed else "end")
 
-    @model_validator(mode="after")
-    def _keys_of_the_kind(self) -> Quantity:
+    def _check_keys_of_the_kind(self) -> Findings:
         _, _, needed, possible = KINDS[self.kind]
         for key in needed:
             if getattr(self, key) is None:
                 expected = "start or end" if key == "end" else "a direction [x, y, z]"
-                refuse([Finding((key,), f"{expected}, because {self.kind} needs it", f"add `{key}: ...`", "nothing")])
+                yield [Finding((key,), f"{expected}, because {self.kind} needs it", f"add `{key}: ...`", "nothing")]
         for key in ("end", "direction", "to", "reference", "point", "normal", "path", "other", "range"):
             if getattr(self, key) is not None and key not in (*needed, *possible):
-                refuse([Finding((key,), f"nothing, because {self.kind} has no {key}", "leave it out")])
+                yield [Finding((key,), f"nothing, because {self.kind} has no {key}", "leave it out")]
         if self.diameter and self.kind != "clearance":
-            refuse([Finding(("diameter",), f"nothing, because {self.kind} has no diameter", "leave it out")])
+            yield [Finding(("diameter",), f"nothing, because {self.kind} has no diameter", "leave it out")]
         if self.kind == "clearance":
-            refuse(self._of_clearance())
+            yield self._of_clearance()
         if self.smallest is not None and self.largest is not None and self.smallest > self.largest:
-            refuse([Finding(("smallest",), f"at most largest, {self.largest:g}", "are the two exchanged?")])
-        return self
+            yield [Finding(("smallest",), f"at most largest, {self.largest:g}", "are the two exchanged?")]
 
     def _of_clearance(self) -> Iterator[Finding]:
         given = [key for key in ("point", "path", "other") if getattr(self, key) is not None]

@@ -12,16 +12,17 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AliasChoices, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, ConfigDict, Discriminator, Field, Tag
 
 from hybrid.scene.base import (
     After,
     Before,
     Finding,
+    Findings,
     Kinds,
     NonNegative,
     Number,
@@ -36,7 +37,7 @@ from hybrid.scene.base import (
     refuse,
     unwrap,
 )
-from hybrid.scene.motion_file import RecordRefused, columns_of, read_once, read_table, readable
+from hybrid.scene.motion_file import RecordRefused, columns_of, read_once, read_table, unreadable
 
 # More points than any survey of a mooring needs; they are kept in memory three times over.
 MOST_POINTS = 4_000_000
@@ -66,33 +67,30 @@ class Depths(Table):
         """The grid as arrays.  Only after validation: the file is readable then."""
         return _from_file(self.file) if self.file is not None else _from_lists(self.x, self.y, self.depth)
 
-    @model_validator(mode="after")
-    def _one_grid(self) -> Depths:
+    def _check_one_grid(self) -> Findings:
         given = [name for name in ("x", "y", "depth") if getattr(self, name)]
         if self.file is not None:
             fix = "leave it out, or leave file out"
-            refuse(Finding((name,), "nothing, because file already gives the depths", fix) for name in given)
-            with readable(self.file):
-                assert self.surface is not None
-            return self
+            yield (Finding((name,), "nothing, because file already gives the depths", fix) for name in given)
+            yield from unreadable(self.file, lambda: self.surface)
+            return
         if len(given) < 3:
             fix = "write x: [...], y: [...], depth: [[...], ...], or file: depths.csv"
-            refuse([Finding((), "x, y and depth, or file", fix)])
+            yield [Finding((), "x, y and depth, or file", fix)]
         for name in ("x", "y"):
             values = getattr(self, name)
             if len(values) < 2:
-                refuse([Finding((name,), "at least two numbers, in m", "a level bed needs no depths: give z alone")])
+                yield [Finding((name,), "at least two numbers, in m", "a level bed needs no depths: give z alone")]
             for k, (a, b) in enumerate(pairwise(values), start=1):
                 if not b > a:
-                    refuse([Finding((name, k), f"a number above the one before, {a:g} m", "sort them")])
+                    yield [Finding((name, k), f"a number above the one before, {a:g} m", "sort them")]
         if len(self.depth) != len(self.x):
             expected = f"{len(self.x)} rows, one for each x"
-            refuse([Finding(("depth",), expected, "rows go with x, columns with y", f"{len(self.depth)} rows")])
+            yield [Finding(("depth",), expected, "rows go with x, columns with y", f"{len(self.depth)} rows")]
         for k, row in enumerate(self.depth):
             if len(row) != len(self.y):
                 expected = f"{len(self.y)} numbers, one for each y"
-                refuse([Finding(("depth", k), expected, "rows go with x, columns with y", f"{len(row)} numbers")])
-        return self
+                yield [Finding(("depth", k), expected, "rows go with x, columns with y", f"{len(row)} numbers")]
 
 
 class Surface(NamedTuple):
@@ -295,16 +293,14 @@ class _Flow(Table):
         towards, speed = math.radians(self.direction or 0.0), self.speed or 0.0
         return speed * round(math.cos(towards), 15), speed * round(math.sin(towards), 15), 0.0
 
-    @model_validator(mode="after")
-    def _one_way_to_say_it(self) -> Self:
+    def _check_one_way_to_say_it(self) -> Findings:
         if self.velocity is not None:
             given = [key for key in ("speed", "direction") if getattr(self, key) is not None]
             expected = "nothing, because velocity gives both"
-            refuse(Finding((key,), expected, "leave the one or the other out") for key in given)
+            yield (Finding((key,), expected, "leave the one or the other out") for key in given)
         elif self.speed is None:
             expected = "three numbers [x, y, z] in m/s; or a speed in m/s, and a direction in degrees from x towards y"
-            refuse([Finding(("velocity",), expected, "add `speed: 0.5` and `direction: 0`")])
-        return self
+            yield [Finding(("velocity",), expected, "add `speed: 0.5` and `direction: 0`")]
 
 
 class CurrentPoint(_Flow):
@@ -371,12 +367,10 @@ class PowerLawCurrent(_Flow):
         """Height of the top [m] in a fluid with that surface (None: it has none)."""
         return self.top if self.top is not None else surface if surface is not None else 0.0
 
-    @model_validator(mode="after")
-    def _top_is_above(self) -> PowerLawCurrent:
+    def _check_top_is_above(self) -> Findings:
         if self.top is not None and self.bottom >= self.top:
             expected = f"a height below the top, {self.top:.8g} m"
-            refuse([Finding(("bottom",), expected, "z points up; heights below the surface are negative")])
-        return self
+            yield [Finding(("bottom",), expected, "z points up; heights below the surface are negative")]
 
 
 _KINDS = ("uniform", "profile", "power_law")
@@ -432,16 +426,14 @@ class Friction(Table):
         "of the penetration at rest [m]",
     )
 
-    @model_validator(mode="after")
-    def _residual_is_less(self) -> Friction:
+    def _check_residual_is_less(self) -> Findings:
         if (self.residual is None) != (self.breakout is None):
             key, other = ("breakout", "residual") if self.breakout is None else ("residual", "breakout")
-            refuse([Finding((key,), f"a value, because {other} is given", f"add `{key}: ...`, or leave {other} out")])
+            yield [Finding((key,), f"a value, because {other} is given", f"add `{key}: ...`, or leave {other} out")]
         for k, (key, most) in enumerate((("axial", self.axial), ("lateral", self.lateral)) if self.residual else ()):
             if self.residual is not None and self.residual[k] > most:
                 expected = f"at most {most:g}, that of break-out ({key})"
-                refuse([Finding(("residual", k), expected, "are the two exchanged?")])
-        return self
+                yield [Finding(("residual", k), expected, "are the two exchanged?")]
 
 
 class Seabed(Table):
@@ -502,22 +494,18 @@ class Seabed(Table):
         assert self.stiffness is not None
         return self.stiffness
 
-    @model_validator(mode="after")
-    def _one_resistance(self) -> Seabed:
+    def _check_one_resistance(self) -> Findings:
         if self.stiffness is None and self.soil is None:
-            refuse([Finding(("stiffness",), "a number > 0, in N/m per m", "add `stiffness: ...`, or soil")])
+            yield [Finding(("stiffness",), "a number > 0, in N/m per m", "add `stiffness: ...`, or soil")]
         for key in ("stiffness", "damping") if self.soil is not None else ():
             if getattr(self, key):
-                refuse([Finding((key,), "nothing, because soil says how the bed resists", f"leave {key} or soil out")])
+                yield [Finding((key,), "nothing, because soil says how the bed resists", f"leave {key} or soil out")]
         travel = self.friction.travel if self.friction is not None else None
         if self.soil is not None and self.soil.lateral is not None and travel is None:
             expected = "a table with `travel`, over which lateral resistance grows"
             fix = "add `friction: {axial: ..., lateral: ..., travel: ...}` (m)"
-            refuse([Finding(("friction",), expected, fix)])
-        return self
+            yield [Finding(("friction",), expected, fix)]
 
-    @model_validator(mode="after")
-    def _one_shape(self) -> Seabed:
+    def _check_one_shape(self) -> Findings:
         if self.slope is not None and self.depths is not None:
-            refuse([Finding(("slope",), "nothing, because depths give the shape of the bed", "leave one of them out")])
-        return self
+            yield [Finding(("slope",), "nothing, because depths give the shape of the bed", "leave one of them out")]

@@ -14,10 +14,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError
 
-from hybrid.scene.base import Finding, Kinds, NonNegative, Pair, Positive, Table, Text, refuse, value_or_table
-from hybrid.scene.motion_file import RecordRefused, columns_of, read_once, read_table, readable
+from hybrid.scene.base import Finding, Findings, Kinds, NonNegative, Pair, Positive, Table, Text, refuse, value_or_table
+from hybrid.scene.motion_file import RecordRefused, columns_of, read_once, read_table, unreadable
 
 # Factors of safety classes of DNV-OS-F201.
 SAFETY_CLASSES = {"low": 1.04, "normal": 1.14, "high": 1.26}
@@ -160,11 +160,8 @@ class CurveFile(Table):
         """Strain and tension (N).  Only after validation: the file is readable then."""
         return _from_file(self.file)
 
-    @model_validator(mode="after")
-    def _readable(self) -> CurveFile:
-        with readable(self.file):
-            assert self.rows
-        return self
+    def _check_readable(self) -> Findings:
+        return unreadable(self.file, lambda: self.rows)
 
 
 @read_once(16)
@@ -261,12 +258,10 @@ class SlipLayer(Table):
         description="by how much the slip moment grows with tension, that at the start of a step [N m per N]",
     )
 
-    @model_validator(mode="after")
-    def _bears(self) -> SlipLayer:
+    def _check_bears(self) -> Findings:
         if self.moment == self.per_tension == 0.0:
             expected = "a number > 0, in N m, or per_tension: a layer without slip moment does nothing"
-            refuse([Finding(("moment",), expected, "add `moment: ...` (N m)")])
-        return self
+            yield [Finding(("moment",), expected, "add `moment: ...` (N m)")]
 
 
 # Of a layer: stiffness, N m^2; slip moment, N m; what this, and then what stiffness gains by tension, m and m^2.
@@ -337,8 +332,7 @@ class Syrope(Table):
         description="highest mean tension that the rope has had before the start; at rest under more, it is that [N]"
     )
 
-    @model_validator(mode="after")
-    def _shape(self) -> Syrope:
+    def _check_shape(self) -> Findings:
         refuse_rows(self.curve, "curve")
         found, straight = [], self.working == "linear"
         if not straight and self.k1 >= 1.0:
@@ -354,8 +348,7 @@ class Syrope(Table):
         if self.highest_tension > last:
             expected = f"at most the tension of the last row of curve, {last:g} N"
             found.append(Finding(("highest_tension",), expected, "add rows up to what the rope bears"))
-        refuse(found)
-        return self
+        yield found
 
     @property
     def rows(self) -> Curve:

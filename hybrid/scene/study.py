@@ -9,11 +9,24 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
-from hybrid.scene.base import Before, Finding, Number, Positive, Table, Text, Truth, Whole, Words, refuse, table_or_list
+from hybrid.scene.base import (
+    Before,
+    Finding,
+    Findings,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Truth,
+    Whole,
+    Words,
+    refuse,
+    table_or_list,
+)
 from hybrid.scene.read import Kind
 
 # Cases of a study: each is a row in memory.
@@ -59,8 +72,7 @@ class Range(Table):
     high: Number | None = Field(default=None, description="of a sample: highest value")
     unit: Text | None = Field(default=None, description="its unit, for tables and axes")
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    def _check_one_way(self) -> Findings:
         ways = {
             "values": self.values is not None,
             "from, to": self.begin is not None or self.end is not None,
@@ -68,21 +80,20 @@ class Range(Table):
         }
         given = [name for name, there in ways.items() if there]
         if len(given) > 1:
-            refuse([Finding((), f"one of {', '.join(ways)}; not {' and '.join(given)}", "values: [1, 2, 3]")])
+            yield [Finding((), f"one of {', '.join(ways)}; not {' and '.join(given)}", "values: [1, 2, 3]")]
         if "from, to" in given:
             if self.begin is None or self.end is None or (self.step is None) == (self.count is None):
-                refuse([Finding((), "from, to, and one of step and count", "{from: 8, to: 14, step: 2}")])
+                yield [Finding((), "from, to, and one of step and count", "{from: 8, to: 14, step: 2}")]
             elif not self.end >= self.begin:
-                refuse([Finding(("to",), f"a number >= from, {self.begin:g}")])
+                yield [Finding(("to",), f"a number >= from, {self.begin:g}")]
             elif self.count == 1 and self.end > self.begin:
-                refuse([Finding(("count",), "2 or more, from one number to another")])
+                yield [Finding(("count",), "2 or more, from one number to another")]
         elif self.step is not None or self.count is not None:
-            refuse([Finding(("step" if self.step is not None else "count",), "nothing, without from and to")])
+            yield [Finding(("step" if self.step is not None else "count",), "nothing, without from and to")]
         if "low, high" in given and (self.low is None or self.high is None or not self.high > self.low):
-            refuse([Finding(("high",), "low and high, the second above the first", "{low: 1, high: 3}")])
+            yield [Finding(("high",), "low and high, the second above the first", "{low: 1, high: 3}")]
         if self.key is not None and self.keys is not None:
-            refuse([Finding(("keys",), "nothing, because key is given", "list it among the keys")])
-        return self
+            yield [Finding(("keys",), "nothing, because key is given", "list it among the keys")]
 
     def listed(self) -> list[Any] | None:
         """Its values; None: of a sample, or of a table of cases."""
@@ -114,12 +125,10 @@ class Sample(Table):
     )
     seed: Annotated[Whole, Field(ge=0)] = Field(default=0, description="seed of its random numbers")
 
-    @model_validator(mode="after")
-    def _power_of_two(self) -> Self:
+    def _check_power_of_two(self) -> Findings:
         if self.method in ("sobol", "saltelli") and self.count & (self.count - 1):
             near = 1 << (self.count.bit_length() - 1)
-            refuse([Finding(("count",), f"a power of two, for {self.method}", f"{near} or {2 * near}")])
-        return self
+            yield [Finding(("count",), f"a power of two, for {self.method}", f"{near} or {2 * near}")]
 
 
 TAKES = (
@@ -162,29 +171,25 @@ class Kept(Table):
         default=None, description="of damage by an S-N curve: area m2, outer diameter m, Young's modulus Pa"
     )
 
-    @model_validator(mode="after")
-    def _of_limits(self) -> Self:
+    def _check_of_limits(self) -> Findings:
         if int("exceedance" in self.take) != sum(x is not None for x in (self.above, self.below)):
             expected = "a value with take: [exceedance], above or below, and nothing without"
-            refuse([Finding(("above",), expected, "above: 5.0e+4")])
+            yield [Finding(("above",), expected, "above: 5.0e+4")]
         if "utilisation" in self.take:
             if self.quantity not in LIMIT_OF:
                 expected = "tension or curvature, which sections have limits of"
-                refuse([Finding(("quantity",), expected, "quantity: tension")])
+                yield [Finding(("quantity",), expected, "quantity: tension")]
             if self.at is not None or self.times is not None:
                 key = "at" if self.at is not None else "times"
-                refuse([Finding((key,), "nothing: utilisation is the largest of all places and steps")])
-        return self
+                yield [Finding((key,), "nothing: utilisation is the largest of all places and steps")]
 
-    @model_validator(mode="after")
-    def _of_damage(self) -> Self:
+    def _check_of_damage(self) -> Findings:
         if ("damage" in self.take) != (self.curve is not None):
-            refuse([Finding(("curve",), "a curve of fatigue with take: [damage], and nothing without", "D sea")])
+            yield [Finding(("curve",), "a curve of fatigue with take: [damage], and nothing without", "D sea")]
         if self.curve is not None and self.quantity != "tension":
-            refuse([Finding(("quantity",), "tension, of which damage is (with bending, where a section is given)")])
+            yield [Finding(("quantity",), "tension, of which damage is (with bending, where a section is given)")]
         if self.curve is None and (self.strength or self.section):
-            refuse([Finding(("strength" if self.strength else "section",), "nothing, without take: [damage]")])
-        return self
+            yield [Finding(("strength" if self.strength else "section",), "nothing, without take: [damage]")]
 
 
 class Study(Table):
@@ -217,12 +222,7 @@ class Study(Table):
         default=False, description="keep the whole result of every case, too: STUDY.files/case-000000.h5 and so on"
     )
 
-    @model_validator(mode="after")
-    def _contradictions(self) -> Self:
-        refuse(self._findings())
-        return self
-
-    def _findings(self) -> list[Finding]:
+    def _check_contradictions(self) -> Findings:
         found = []
         for name in (*self.derive, *(self.collect or ())):
             if not _NAME.fullmatch(name) or name in TAKEN:
@@ -253,7 +253,7 @@ class Study(Table):
         if self.combine == "zip" and len(set(lengths.values())) > 1:
             sizes = ", ".join(f"{name} {n}" for name, n in lengths.items())
             found.append(Finding(("combine",), f"lists of equal length to zip ({sizes})", "combine: grid"))
-        return found
+        yield found
 
 
 def _wrapped(data: Any) -> Any:
@@ -305,17 +305,15 @@ class Unknown(Table):
     high: Number | None = Field(default=None, description="its upper bound")
     start: Number | None = Field(default=None, description="where the search begins; absent: the number of the scene")
 
-    @model_validator(mode="after")
-    def _bounds(self) -> Self:
+    def _check_bounds(self) -> Findings:
         if self.key is not None and self.keys is not None:
-            refuse([Finding(("keys",), "nothing, because key is given", "list it among the keys")])
+            yield [Finding(("keys",), "nothing, because key is given", "list it among the keys")]
         if self.low is not None and self.high is not None and not self.high > self.low:
-            refuse([Finding(("high",), f"a number above low, {self.low:g}")])
+            yield [Finding(("high",), f"a number above low, {self.low:g}")]
         if self.start is not None:
             low, high = (x if x is not None else self.start for x in (self.low, self.high))
             if not low <= self.start <= high:
-                refuse([Finding(("start",), f"a number from low to high, {low:g} to {high:g}")])
-        return self
+                yield [Finding(("start",), f"a number from low to high, {low:g} to {high:g}")]
 
     def keys_of(self, name: str) -> tuple[str, ...]:
         """The keys that it sets; name: its own."""
@@ -340,15 +338,13 @@ class OfEquilibrium(Table):
         default=None, description="of the motion: what of its outputs; absent: of the equilibrium"
     )
 
-    @model_validator(mode="after")
-    def _one_place(self) -> Self:
+    def _check_one_place(self) -> Findings:
         if self.at is not None and self.section is not None:
-            refuse([Finding(("section",), "nothing, because a place is given by at")])
+            yield [Finding(("section",), "nothing, because a place is given by at")]
         if self.section is not None and self.over not in (None, "max", "min"):
-            refuse([Finding(("over",), "max or min along the section", "over: max")])
+            yield [Finding(("over",), "max or min along the section", "over: max")]
         if re.search(r"[@ /]", self.quantity):
-            refuse([Finding(("quantity",), "a quantity alone, such as tension or position.z", "at and line say where")])
-        return self
+            yield [Finding(("quantity",), "a quantity alone, such as tension or position.z", "at and line say where")]
 
 
 class OneResult(OfEquilibrium):
@@ -359,15 +355,13 @@ class OneResult(OfEquilibrium):
     )
     case: Text | None = Field(default=None, description="in which case, where there are several")
 
-    @model_validator(mode="after")
-    def _one_number(self) -> Self:
+    def _check_one_number(self) -> Findings:
         if self.at is not None and self.take is not None:
-            refuse([Finding(("take",), "nothing, because a place is given by at")])
+            yield [Finding(("take",), "nothing, because a place is given by at")]
         if self.over is not None and self.take is not None:
-            refuse([Finding(("take",), "nothing: over says it, of the whole line where no place is given")])
+            yield [Finding(("take",), "nothing: over says it, of the whole line where no place is given")]
         if self.section is not None and self.take is None and self.over is None:
-            refuse([Finding(("take",), "max or min along the section", "take: max")])
-        return self
+            yield [Finding(("take",), "max or min along the section", "take: max")]
 
 
 class Aim(OneResult):
@@ -387,13 +381,11 @@ class Limit(OfEquilibrium):
     smallest: Number | None = Field(default=None, description="what it may be at least, in the unit of the quantity")
     cases: Names | None = Field(default=None, description="in which cases; absent: in all of them")
 
-    @model_validator(mode="after")
-    def _a_limit(self) -> Self:
+    def _check_a_limit(self) -> Findings:
         if self.largest is None and self.smallest is None:
-            refuse([Finding((), "largest, smallest, or both", "largest: 1.35e+5")])
+            yield [Finding((), "largest, smallest, or both", "largest: 1.35e+5")]
         if self.largest is not None and self.smallest is not None and not self.largest > self.smallest:
-            refuse([Finding(("largest",), f"a number above smallest, {self.smallest:g}")])
-        return self
+            yield [Finding(("largest",), f"a number above smallest, {self.smallest:g}")]
 
 
 class Measured(Table):
@@ -440,12 +432,7 @@ class Design(Table):
         default=None, description="instead of all these: what was measured, from which unknowns are found"
     )
 
-    @model_validator(mode="after")
-    def _contradictions(self) -> Self:
-        refuse(self._findings())
-        return self
-
-    def _findings(self) -> list[Finding]:
+    def _check_contradictions(self) -> Findings:
         found, taken = [], [*SPOKEN_FOR]
         for table in ("unknowns", "results"):
             for name in getattr(self, table):
@@ -473,7 +460,7 @@ class Design(Table):
                     if each.case is None:
                         expected = f"the case in which it is meant, one of: {', '.join(self.cases)}"
                         found.append(Finding((table, name, "case"), expected))
-        return found
+        yield found
 
     def _cases_named(self) -> list[tuple[str, str, str]]:
         """Tables, entries, and the cases that they name."""

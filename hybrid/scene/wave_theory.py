@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AliasChoices, Field, model_validator
+from pydantic import AliasChoices, Field
 
-from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Table, Whole, refuse
+from hybrid.scene.base import Finding, Findings, Kinds, Number, Place, Positive, Table, Whole
 
 RAMP = "time over which the sea grows from nothing, smoothly; absent: there from the beginning [s]"
 DIRECTION = "direction (heading) in which the waves travel, from x counter-clockwise seen from above [deg]"
@@ -142,14 +142,12 @@ class PiersonMoskowitzWaves(Spectrum):
         key = "peak_period" if self.peak_period is not None else "zero_crossing_period"
         yield self.significant_height, ("significant_height",), self.main_period, (key,)
 
-    @model_validator(mode="after")
-    def _one_period(self) -> PiersonMoskowitzWaves:
+    def _check_one_period(self) -> Findings:
         if self.peak_period is None and self.zero_crossing_period is None:
-            refuse([Finding(("peak_period",), "a number > 0, in s", "add peak_period, or zero_crossing_period")])
+            yield [Finding(("peak_period",), "a number > 0, in s", "add peak_period, or zero_crossing_period")]
         if self.peak_period is not None and self.zero_crossing_period is not None:
             expected = "nothing, because peak_period says it"
-            refuse([Finding(("zero_crossing_period",), expected, "leave one of them out")])
-        return self
+            yield [Finding(("zero_crossing_period",), expected, "leave one of them out")]
 
 
 class SeaPart(Table):
@@ -237,14 +235,12 @@ class SumOfWaves(OnWater):
         for i, x in enumerate(self.spectra):
             yield from ((("spectra", i, *at), heading) for at, heading in x.headings())
 
-    @model_validator(mode="after")
-    def _one_sea(self) -> SumOfWaves:
+    def _check_one_sea(self) -> Findings:
         for i, x in enumerate(self.spectra):
             for key in ("depth", "ramp"):
                 if getattr(x, key) is not None:
                     expected = "nothing, because all seas of a sum have the same"
-                    refuse([Finding(("spectra", i, key), expected, f"give it beside spectra, as waves.{key}")])
-        return self
+                    yield [Finding(("spectra", i, key), expected, f"give it beside spectra, as waves.{key}")]
 
 
 Array = NDArray[np.float64]

@@ -18,14 +18,14 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Text, Whole, refuse
-from hybrid.scene.motion_file import RecordRefused, columns_of, netcdf_reader, read_once, read_table, readable
+from hybrid.scene.base import Finding, Findings, Kinds, Number, Place, Positive, Text, Whole, refuse
+from hybrid.scene.motion_file import RecordRefused, columns_of, netcdf_reader, read_once, read_table, unreadable
 from hybrid.scene.wave_theory import (
     DIRECTION,
     JonswapWaves,
@@ -263,7 +263,24 @@ def _of_wavespectra(path: str, name: str, record: int | None) -> tuple[Array, Ar
     return f, came, E
 
 
-class RegularWaves(OnWater):
+class _Periodic(OnWater):
+    """Waves of one period and direction."""
+
+    if TYPE_CHECKING:
+        period: float
+        direction: float
+
+    @property
+    def main_period(self) -> float:
+        """The period that carries most energy [s]."""
+        return self.period
+
+    def headings(self) -> Iterator[tuple[Place, float]]:
+        """Directions [deg] that tell in which planes the water moves, with their keys."""
+        yield ("direction",), self.direction
+
+
+class RegularWaves(_Periodic):
     """Linear (Airy) waves of one period: elevation height / 2 x cos(k x - w t + phase) along their direction."""
 
     kind: Literal["regular"] = Field(default="regular", description="one period, linear (Airy)")
@@ -271,11 +288,6 @@ class RegularWaves(OnWater):
     period: Positive = Field(description="period T [s]")
     direction: Number = Field(default=0.0, description=DIRECTION)
     phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
-
-    @property
-    def main_period(self) -> float:
-        """The period that carries most energy [s]."""
-        return self.period
 
     @property
     def waves_in_sum(self) -> int:
@@ -286,12 +298,8 @@ class RegularWaves(OnWater):
         """Heights and periods."""
         yield self.height, ("height",), self.period, ("period",)
 
-    def headings(self) -> Iterator[tuple[Place, float]]:
-        """Directions [deg] that tell in which planes the water moves, with their keys."""
-        yield ("direction",), self.direction
 
-
-class StreamFunctionWaves(OnWater):
+class StreamFunctionWaves(_Periodic):
     """Waves of one period and finite height, steady: crests are sharper than troughs, and nothing is stretched."""
 
     kind: Literal["stream_function"] = Field(
@@ -313,11 +321,6 @@ class StreamFunctionWaves(OnWater):
         return found
 
     @property
-    def main_period(self) -> float:
-        """The period that carries most energy [s]."""
-        return self.period
-
-    @property
     def waves_in_sum(self) -> int:
         """Number of harmonics."""
         return self.order
@@ -325,10 +328,6 @@ class StreamFunctionWaves(OnWater):
     def sizes(self) -> Iterator[Size]:
         """Nothing: whether it breaks is found with the wave."""
         yield from ()
-
-    def headings(self) -> Iterator[tuple[Place, float]]:
-        """Directions [deg] that tell in which planes the water moves, with their keys."""
-        yield ("direction",), self.direction
 
 
 PeriodicWaves = RegularWaves | StreamFunctionWaves
@@ -368,11 +367,8 @@ class _OfFile(OnWater):
         """Directions [deg] that tell in which planes the water moves, with their keys."""
         yield from ((("file",), heading) for heading in sorted({float(x) for x in self.recorded.waves[:, 3]}))
 
-    @model_validator(mode="after")
-    def _readable(self) -> Self:
-        with readable(self.file):
-            assert self.recorded
-        return self
+    def _check_readable(self) -> Findings:
+        return unreadable(self.file, lambda: self.recorded)
 
 
 class GivenWaves(_OfFile):
@@ -420,14 +416,11 @@ class RecordedWaves(_OfFile):
         """Directions [deg] that tell in which planes the water moves, with their keys."""
         yield ("direction",), self.direction
 
-    @model_validator(mode="after")
-    def _readable(self) -> Self:
+    def _check_readable(self) -> Findings:
         short, long = self._band
         if long <= short:
-            refuse([Finding(("longest_period",), f"more than shortest_period, {short:g} s", "swap them")])
-        with readable(self.file):
-            assert self.recorded
-        return self
+            yield [Finding(("longest_period",), f"more than shortest_period, {short:g} s", "swap them")]
+        yield from super()._check_readable()
 
 
 class MeasuredWaves(_OfFile, Summed):

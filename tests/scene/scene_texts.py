@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.read import parse_scene
 
@@ -256,6 +258,32 @@ def complaints(text: str, overrides: tuple[str, ...] = ()) -> list[Complaint]:
         assert str(error).startswith("scene.yaml")
         return error.complaints
     return []
+
+
+# The scene, a part of it, what stands there instead with `§` where the complaint must point, the key that it must name,
+# and words that the fix (or what was expected) must contain.
+Case = tuple[str, str | None, str | None, str, str]
+
+
+def refused(case: Case, alone: bool = True) -> None:
+    """That a text is refused at its line, column and key; alone: by that complaint and no other."""
+    text, old, new, where, fix = case
+    text = change(text, old, new) if old is not None and new is not None else text
+    point = None
+    if "§" in text:
+        text, *point = marked(text)
+    found = complaints(text)
+    assert where in [c.where for c in found], found
+    if alone:
+        assert [c.where for c in found] == [where]
+    complaint = next(c for c in found if c.where == where)
+    assert len([c for c in found if c == complaint]) == 1
+    if point is not None:
+        assert [complaint.line, complaint.column] == point
+    assert complaint.line is not None and complaint.value
+    assert fix in complaint.fix or fix in complaint.expected, complaint
+    words = complaint.expected
+    assert not re.search(r"Input should|\b(tuple|dict|str|int|NoneType)\b(?!\))|<\w", words), complaint
 
 
 def marked(text: str) -> tuple[str, int, int]:

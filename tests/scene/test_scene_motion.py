@@ -1,7 +1,8 @@
-"""Motion of an end: velocity is the derivative of position, frames turn as the angular velocity says, C2 everywhere."""
+"""Motion of an end: harmonics, travel, waves that are followed, records; C2 everywhere, and what is refused."""
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from scene_texts import OCEAN, change, complaints
 
 from hybrid.errors import SceneError
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.motion_tables import Harmonic, Motion
+from hybrid.scene.motion_tables import Harmonic, Motion, Travel, smooth_step, way_of_smooth_step
 from hybrid.scene.read import parse_scene, validate_scene
 from hybrid.scene.root import Scene
 
@@ -56,32 +57,82 @@ def recorded(tmp_path: Path) -> Motion:
     return Motion(file=_csv(tmp_path / "swell.csv", t, {"": PLACE + _swell(t), "r": 40.0 * _swell(t)}))
 
 
+SWELL = Harmonic(amplitude=1.0, period=9.0, phase=20.0)
+CHOP = Harmonic(amplitude=0.3, period=4.0, phase=-70.0)
+
+# A wave of 1.2 m amplitude and 60 m length that travels along (0.8, 0.6) and grows over 12 s.
+K, W, A, RAMP = 2 * math.pi / 60.0, 1.0, 1.2, 12.0
+
+
+def sea(x: float, y: float, t: float) -> tuple[float, float, float, float]:
+    """Elevation, its rate at a place that stands, and its slopes."""
+    grown, rate = smooth_step(t / RAMP)
+    angle = K * (0.8 * x + 0.6 * y) - W * t + 0.4
+    eta, down = grown * A * math.cos(angle), grown * A * math.sin(angle)
+    return eta, A * rate / RAMP * math.cos(angle) + W * down, -0.8 * K * down, -0.6 * K * down
+
+
+MOTIONS = {
+    "angles": HARMONIC,
+    "a list": Motion(heave=(SWELL, CHOP), sway=SWELL, ramp=10.0),
+    "velocity": Motion(velocity=(0.5, -0.3, 0.1), ramp=10.0),
+    "travel": Motion(travel=Travel(by=(20.0, 5.0, -3.0), over=10.0, begin=4.0)),
+    "waves": Motion(follow="waves"),
+    "everything": Motion(
+        surge=(SWELL, CHOP),
+        velocity=(0.5, -0.3, 0.1),
+        travel=Travel(by=(20.0, 5.0, -3.0), over=10.0, begin=4.0),
+        follow="waves",
+        ramp=10.0,
+    ),
+}
+
+
 def derivative(f: Callable[[float], Array], t: float, h: float = 1e-3) -> Array:
-    """Sixth-order central difference: error h^6 f''' /140 and round-off eps/h, both below 1e-11 here."""
+    """Sixth-order central difference: error h^6 f''' / 140 and round-off eps / h, both below 1e-11 here."""
     w = {1: 45.0, 2: -9.0, 3: 1.0}
     return np.asarray(sum(c * (f(t + k * h) - f(t - k * h)) for k, c in w.items()) / (60.0 * h))
 
 
-def _check_derivatives(motion: EndMotion, times: list[float], tolerance: float) -> None:
-    for t in times:
-        position, velocity, frame, spin = motion.at_time(t)
-        np.testing.assert_allclose(velocity, derivative(lambda u: motion.at_time(u)[0], t), atol=tolerance)
-        assert frame is not None
+@pytest.fixture(params=[*MOTIONS, "recorded"])
+def moved(request: pytest.FixtureRequest, recorded: Motion) -> EndMotion:
+    """An end that moves in each of these ways."""
+    return EndMotion(MOTIONS.get(request.param, recorded), PLACE, BASE, elevation=sea)
+
+
+def test_velocity_and_spin_are_derivatives(moved: EndMotion) -> None:
+    """In the ramp, at its end and beyond; between samples of the record, where its spline is one cubic."""
+    assert moved.moving
+    for t in (0.6, 3.3, 4.6, 7.13, 9.6, 11.7, 13.8, 20.6, 39.3):
+        position, velocity, frame, spin = moved.at_time(t)
+        np.testing.assert_allclose(velocity, derivative(lambda u: moved.at_time(u)[0], t), atol=1e-9)
+        assert frame is not None and position.shape == (3,)
         np.testing.assert_allclose(frame.T @ frame, np.eye(3), atol=1e-14)
         assert np.linalg.det(frame) == pytest.approx(np.linalg.det(BASE))
-        rate = derivative(lambda u: np.asarray(motion.at_time(u)[2]), t) @ frame.T
-        np.testing.assert_allclose(rate, np.cross(np.eye(3), spin), atol=tolerance)
-        assert position.shape == (3,)
+        rate = derivative(lambda u: np.asarray(moved.at_time(u)[2]), t) @ frame.T
+        np.testing.assert_allclose(rate, np.cross(np.eye(3), spin), atol=1e-9)
 
 
-def test_harmonic_derivatives() -> None:
-    # ramp, its end and beyond; differences straddle no more than a jump of the third derivative
-    _check_derivatives(EndMotion(HARMONIC, PLACE, BASE), [0.5, 3.3, 7.0, 9.9, 12.0, 33.3], 1e-9)
+def test_it_starts_at_rest_where_it_is_held(moved: EndMotion) -> None:
+    position, velocity, frame, spin = moved.at_time(0.0)
+    np.testing.assert_allclose(position, PLACE, atol=1e-14)
+    np.testing.assert_allclose(frame, BASE, atol=1e-14)
+    assert np.abs(velocity).max() < 1e-12 and np.abs(spin).max() < 1e-14
 
 
-def test_recorded_derivatives(recorded: Motion) -> None:
-    # between samples, where the spline is one cubic and the difference exact
-    _check_derivatives(EndMotion(recorded, PLACE, BASE), [0.1, 1.1, 7.13, 20.6, 39.3], 1e-9)
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("t", [0.0, 4.0, 10.0, 12.0, 14.0])
+def test_acceleration_is_continuous_where_something_begins_or_ends(name: str, t: float) -> None:
+    """One-sided accelerations differ by O(h): they halve with h, or are round-off."""
+    motion = EndMotion(MOTIONS[name], PLACE, BASE, elevation=sea)
+
+    def jump(h: float) -> float:
+        left = (motion.at_time(t)[1] - motion.at_time(t - h)[1]) / h
+        right = (motion.at_time(t + h)[1] - motion.at_time(t)[1]) / h
+        return float(np.abs(right - left).max())
+
+    assert jump(1e-3) < (0.1 if name == "angles" else 2e-2)
+    assert jump(1e-3) <= 0.6 * jump(2e-3) + 1e-9
 
 
 def test_angles_follow_the_convention() -> None:
@@ -146,28 +197,6 @@ def test_small_and_large_angles_join() -> None:
     np.testing.assert_allclose(_turn_by_vector(np.zeros(3), rate)[0], np.eye(3), atol=0)
 
 
-@pytest.mark.parametrize("t", [0.0, 10.0])
-def test_c2_across_start_and_end_of_the_ramp(t: float) -> None:
-    """Acceleration is continuous: its one-sided values differ by O(h), and halve with h."""
-    motion = EndMotion(HARMONIC, PLACE, BASE)
-
-    def jump(h: float) -> float:
-        left = (motion.at_time(t)[1] - motion.at_time(t - h)[1]) / h
-        right = (motion.at_time(t + h)[1] - motion.at_time(t)[1]) / h
-        return float(np.abs(right - left).max())
-
-    assert jump(1e-4) < 1e-2
-    assert jump(1e-4) == pytest.approx(jump(2e-4) / 2, rel=0.05)
-
-
-def test_starts_at_rest_where_it_is_held(recorded: Motion) -> None:
-    for motion in (EndMotion(HARMONIC, PLACE, BASE), EndMotion(recorded, PLACE, BASE)):
-        position, velocity, frame, spin = motion.at_time(0.0)
-        np.testing.assert_allclose(position, PLACE, atol=1e-14)
-        np.testing.assert_allclose(frame, BASE, atol=1e-14)
-        assert np.abs(velocity).max() < 1e-14 and np.abs(spin).max() < 1e-14
-
-
 def test_what_does_not_move() -> None:
     zero = Motion(heave=Harmonic(amplitude=0.0, period=3.0))
     for motion in (EndMotion(None, PLACE, BASE), EndMotion(zero, PLACE, BASE)):
@@ -186,6 +215,67 @@ def test_after_the_record_the_end_stays(recorded: Motion) -> None:
     motion = EndMotion(recorded, PLACE, BASE)
     for last, beyond in zip(motion.at_time(39.75), motion.at_time(1e9), strict=True):
         np.testing.assert_array_equal(last, beyond)
+
+
+def test_harmonics_of_a_list_add_up() -> None:
+    both = EndMotion(Motion(heave=[SWELL, CHOP], ramp=10.0), PLACE)
+    one, other = (EndMotion(Motion(heave=h, ramp=10.0), PLACE) for h in (SWELL, CHOP))
+    for t in (3.0, 25.0):
+        for k in (0, 1):
+            rest = PLACE if k == 0 else 0.0
+            np.testing.assert_allclose(both.at_time(t)[k], one.at_time(t)[k] + other.at_time(t)[k] - rest, atol=1e-14)
+    assert Motion(heave=SWELL, yaw=[CHOP]).harmonics() == {"heave": (SWELL,), "yaw": (CHOP,)}
+
+
+def test_turns_of_a_list_add_up() -> None:
+    frame = np.eye(3)
+    two = EndMotion(
+        Motion(yaw=[Harmonic(amplitude=10, period=8), Harmonic(amplitude=20, period=8)], ramp=10.0), None, frame
+    )
+    one = EndMotion(Motion(yaw=Harmonic(amplitude=30, period=8), ramp=10.0), None, frame)
+    np.testing.assert_allclose(two.at_time(23.0)[2], one.at_time(23.0)[2], atol=1e-14)
+    np.testing.assert_allclose(two.at_time(23.0)[3], one.at_time(23.0)[3], atol=1e-14)
+
+
+def test_steady_travel_reaches_its_velocity_and_lags_by_half_the_ramp() -> None:
+    motion = EndMotion(Motion(velocity=(2.0, 0.0, -1.0), ramp=10.0), PLACE)
+    np.testing.assert_allclose(motion.at_time(30.0)[1], (2.0, 0.0, -1.0), atol=1e-14)
+    np.testing.assert_allclose(motion.at_time(30.0)[0] - PLACE, 25.0 * np.array([2.0, 0.0, -1.0]), atol=1e-12)
+    np.testing.assert_allclose(motion.at_time(5.0)[1], (1.0, 0.0, -0.5), atol=1e-14)
+
+
+def test_a_travel_arrives_and_stays() -> None:
+    motion = EndMotion(MOTIONS["travel"], PLACE)
+    for t in (0.0, 3.9, 4.0):
+        np.testing.assert_array_equal(motion.at_time(t)[0], PLACE)
+    np.testing.assert_allclose(motion.at_time(9.0)[0] - PLACE, (10.0, 2.5, -1.5), atol=1e-14)
+    for t in (14.0, 1e6):
+        np.testing.assert_allclose(motion.at_time(t)[0] - PLACE, (20.0, 5.0, -3.0), atol=1e-14)
+        assert not motion.at_time(t)[1].any()
+
+
+def test_the_smooth_step_is_the_derivative_of_its_way() -> None:
+    for x in (-1.0, 0.2, 0.5, 0.9, 3.0):
+        slope = derivative(lambda u: np.array(way_of_smooth_step(u)), x)
+        assert smooth_step(x)[0] == pytest.approx(float(slope), abs=1e-12)
+        assert smooth_step(x)[1] == pytest.approx(
+            float(derivative(lambda u: np.array(smooth_step(u)[0]), x)), abs=1e-11
+        )
+    assert way_of_smooth_step(1.0) == 0.5 and way_of_smooth_step(4.0) == 3.5
+
+
+def test_an_end_that_follows_waves_needs_them() -> None:
+    with pytest.raises(ValueError, match="elevation"):
+        EndMotion(MOTIONS["waves"], PLACE)
+    position, velocity, *_ = EndMotion(MOTIONS["waves"], PLACE, elevation=sea).at_time(30.0)
+    eta, rate, *_ = sea(PLACE[0], PLACE[1], 30.0)
+    np.testing.assert_array_equal(position, PLACE + np.array([0.0, 0.0, eta]))
+    np.testing.assert_array_equal(velocity, (0.0, 0.0, rate))
+
+
+def test_nothing_moves_without_a_way() -> None:
+    assert not EndMotion(Motion(velocity=(0.0, 0.0, 0.0)), PLACE).moving
+    assert EndMotion(Motion(follow="waves"), PLACE, elevation=sea).moving
 
 
 # --- refusals ----------------------------------------------------------------------------------
@@ -373,3 +463,28 @@ def test_the_motion_files_of_the_page(tmp_path: Path, monkeypatch: pytest.Monkey
     scene = scene.replace("tangent: [1, 0, 1]", "tangent: [1, 0, 1], motion: {file: turn.csv}")
     ends = parse_scene(scene, "scene.yaml").ends
     assert ends.start.motion.file.endswith("turn.csv") and ends.end.motion.file.endswith("lift.csv")
+
+
+# --- a record that leaps ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("back", [False, True], ids=["for good", "and back"])
+@pytest.mark.parametrize("row", [1, 2, 60, 197, 198, 199, 200])
+@pytest.mark.parametrize("swell", [0.0, 2.0])
+def test_a_leap_of_20_m_between_two_samples_is_refused(tmp_path: Path, swell: float, row: int, back: bool) -> None:
+    """Wherever it is, also in the first and in the last rows of the record."""
+    t = np.arange(0.0, 100.1, 0.5)
+    z = np.array([swell * smooth_step(u / 16.0)[0] * math.sin(2 * math.pi * u / 8.0) for u in t])
+    table = np.column_stack([t, 205.0 + 0.0 * t, 0.0 * t, z])
+    name = tmp_path / "fairlead.csv"
+    text = change(OCEAN, HEAVE, f"{{file: {name}}}")
+
+    def said(rows: Array) -> list[str]:
+        np.savetxt(name, rows, delimiter=",", header="t,x,y,z", comments="", fmt="%.6g")
+        return [f"{c.where}: {c.value}" for c in complaints(text)]
+
+    assert said(table) == []
+    table[row : row + 1 if back else None, 3] += 20.0
+    (complaint,) = said(table)
+    assert complaint.startswith("ends.end.motion.file: fairlead.csv, whose velocity jumps by") or row <= 2
+    assert "jumps by" in complaint or "starts with" in complaint
