@@ -172,18 +172,13 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
     return went
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("count", "seed"), [pytest.param(2, 1, marks=pytest.mark.slow), pytest.param(34, 2, marks=pytest.mark.bench)]
+)
 @pytest.mark.parametrize("name", SCENES)
-def test_some_kills(name, tmp_path):
-    went = kills(name, 2, tmp_path, 1)
-    assert went["opened"] == went["killed"] - went["before there was a file"]
-    assert went["steps times cells recomputed"] <= 2 * WORK
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("name", SCENES)
-def test_a_hundred_kills(name, tmp_path):
-    went = kills(name, 34, tmp_path, 2)
+def test_kills(name: str, count: int, seed: int, tmp_path: Path) -> None:
+    """Of all three scenes two at a time, or a hundred in all."""
+    went = kills(name, count, tmp_path, seed)
     print(f"\n{name}: " + ", ".join(f"{text} {number}" for text, number in went.items()))
     assert went["opened"] == went["killed"] - went["before there was a file"]
     assert went["steps times cells recomputed"] <= 2 * WORK

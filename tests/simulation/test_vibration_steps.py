@@ -115,11 +115,10 @@ def test_a_checkpoint_goes_on_and_a_forged_one_does_not():
     assert again.look > clock.now
 
 
-@both_ways
 @pytest.mark.long
-def test_steps_are_longer_where_it_has_died_out_and_forces_stay_right(network):
+def test_steps_are_longer_where_it_has_died_out_and_forces_stay_right():
     """Of 40 s with short steps throughout there were 8949 (docs/evidence/accuracy.md); drag stops the vibration in 2 s."""
-    whole = hybrid.run(said(sag(), network))
+    whole = hybrid.run(said(sag(), network=True))
     result = line_of(whole)
     t, step = np.array(result.steps["t"]), first_resolution(sag()).step
     dt = np.diff(t)
@@ -134,17 +133,15 @@ def test_steps_are_longer_where_it_has_died_out_and_forces_stay_right(network):
     assert 0.7 <= result.attributes["error_total_end_force"] / off <= 3.0
 
 
-@both_ways
-def test_drag_that_sets_it_off_again_in_every_period_keeps_steps_short(network):
+def test_drag_that_sets_it_off_again_in_every_period_keeps_steps_short():
     """At 1 %: steps that follow the motion alone damp 1.4 N of it in every period, which no run would show."""
-    dt = np.diff(line_of(hybrid.run(said(sag(accuracy="1%", duration=8.0), network))).steps["t"])
+    dt = np.diff(line_of(hybrid.run(said(sag(accuracy="1%", duration=8.0), network=True))).steps["t"])
     assert dt.max() <= 1.001 * PERIOD / 48.0
 
 
-@both_ways
 @pytest.mark.long
-def test_a_stopped_run_goes_on_bit_for_bit(tmp_path, monkeypatch, network):
-    scene, stopping = said(sag(duration=6.0, accuracy="10%", ramp=0.5), network), Stopping(monkeypatch)
+def test_a_stopped_run_goes_on_bit_for_bit(tmp_path, monkeypatch):
+    scene, stopping = said(sag(duration=6.0, accuracy="10%", ramp=0.5), network=True), Stopping(monkeypatch)
     hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
     heard = stopping.heard
     assert went_on(scene, tmp_path / "run.h5", stopping, [round(0.6 * heard), heard // 5, heard // 10]) == 3
