@@ -25,27 +25,16 @@ def cable(obstacle: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def lines(obstacle: dict[str, Any]) -> dict[str, Any]:
-    """The same as one of several lines."""
-    line = {"start": "p", "end": "q", "sections": [ROPE], "model": "rod", "mesh": {"cells": 60}}
-    return {
-        "points": {"p": {"position": ARCH[0]}, "q": {"position": ARCH[-1]}}, "obstacles": {"a": obstacle},
-        "lines": {"rope": line | {"initial": {"kind": "equilibrium", "points": ARCH}}},
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize("obstacle", [PIPE, BOX], ids=["pipe", "box"])
-@pytest.mark.parametrize("scene", [cable, lines])
-def test_a_line_begun_above_an_obstacle_rests_on_it(scene: Any, obstacle: dict[str, Any]) -> None:
-    found = hybrid.static(scene(obstacle))
-    r = (found if scene is cable else found.lines["rope"]).position[-1]
+def test_a_line_begun_above_an_obstacle_rests_on_it(obstacle: dict[str, Any]) -> None:
+    found = hybrid.static(cable(obstacle))
+    r = found.position[-1]
     middle = r[np.argmin(np.abs(r[:, 0]))]
     assert middle[2] == pytest.approx(0.11, abs=0.01)  # on its top, where cells of 0.037 m cut the corner
     assert not [x for x in found.events if "is between" in x.text]
 
 
-@pytest.mark.parametrize("scene", [cable, lines])
-def test_a_line_that_is_not_where_it_was_begun_is_told(scene: Any) -> None:
-    found = hybrid.static(scene(BALL))  # from which it slides off to one side
+def test_a_line_that_is_not_where_it_was_begun_is_told() -> None:
+    found = hybrid.static(cable(BALL))  # from which it slides off to one side
     events = [x for x in found.events if x.kind == "several equilibria" and "obstacle a is between" in x.text]
     assert len(events) == 1
