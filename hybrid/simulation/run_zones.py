@@ -44,7 +44,7 @@ from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.result_file import marks_on
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.network_steps import NetworkSteps, Tried
+from hybrid.solve.network_steps import NetworkSteps
 from hybrid.store.integrity import matched
 from hybrid.zones.change import LETTING_GO, LONGEST_IN_RAMP, READY, ZoneSwitching, on_layout
 from hybrid.zones.manager import Change, DomainManager
@@ -306,14 +306,13 @@ class RunZones(Part):
         for x in self.lines:
             k = x.number
             old, new = run.state.lines[k], run.other.lines[k]
-            how = Tried(taken.outcome, taken.iterations, taken.correction, taken.where)
             if taken.outcome != Outcome.OK and taken.line not in (k, -1):
                 continue
             if taken.outcome == Outcome.OK and not self._compiled:
                 x.do_phase(run, b.JUDGE, run.t, end, old, new)
-            change = x.switching.rescue(how, end, new, self._rescues)
+            change = x.switching.rescue(taken, end, new, self._rescues)
             if change is None and last:
-                change = x.switching.all_rod(how)
+                change = x.switching.all_rod(taken)
             if change is not None:
                 changes.append((x, change))
         self._rescues += bool(changes)

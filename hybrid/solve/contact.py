@@ -301,13 +301,9 @@ class SelfContact(ContactBooks):
         """The states from which and to which the next step leads, where they do not take turns."""
         self._job.bind(old=old, new=new)
 
-    def attach(
-        self, line: Line, ends: Ends, states: tuple[State, State], work: Work, books: Books, sea: Sea | None = None
-    ) -> np.ndarray:
-        """The table of the kernel for a run; `call` has its address then.  sea: where sheaves turn with the line."""
+    def attach(self, line: Line, ends: Ends, states: tuple[State, State], work: Work, books: Books) -> np.ndarray:
+        """The table of the kernel for a run; `call` has its address then."""
         old, new = states
-        if sea is not None and sea.rolling.size:
-            self._job.bind(carried=sea.carried, rolling=sea.rolling)
         self._job.bind(
             line=line, ends=ends, old=old, new=new, work=work, clock=books.clock, counts=books.counts, call=self.call,
             contact=self.contact, touch=books.touch, velocity=books.velocity, power=books.power, report=books.report,

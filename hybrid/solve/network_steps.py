@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,15 +55,6 @@ WAVES_OF_A_CELL = 10
 MOST_SAMPLED = 2_000_000
 # Of steps that have become short: kernels.state.books.Counts.
 LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_error", "cut_at"
-
-
-class Tried(NamedTuple):
-    """How a try ended."""
-
-    outcome: Outcome
-    iterations: int  # of Newton's method
-    correction: float  # the next one, as it is predicted, relative
-    where: int  # cell or node where it was worst
 
 
 def batch_of_rows(

@@ -20,7 +20,7 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, on_other_parts
-from hybrid.solve.network_steps import Tried
+from hybrid.solve.stepper import NetworkTaken
 from hybrid.store.integrity import matched
 from hybrid.zones.manager import OF_BASE, Change, DomainManager
 
@@ -178,7 +178,7 @@ class ZoneSwitching:
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
             zones.counts.relaxing = 1
 
-    def rescue(self, how: Tried, end: float, tried: State, rescues: int) -> Change | None:
+    def rescue(self, how: NetworkTaken, end: float, tried: State, rescues: int) -> Change | None:
         """More rod for a step to `end` (s) that failed or took a catenary too far; None: as it is.
 
         tried: the state that the step led to; rescues: of this step, so far.
@@ -198,7 +198,7 @@ class ZoneSwitching:
             most = 1  # after that, a smaller step
         return self._force_rod(cells, why) if rescues < most and cells.size else None
 
-    def all_rod(self, how: Tried) -> Change | None:
+    def all_rod(self, how: NetworkTaken) -> Change | None:
         """The last resort of a step that fails however small: rod wherever the scene lets it be; None: it is."""
         why = f"steps fail here, however small ({how.outcome.cause}); repeated with rods everywhere"
         return self._force_rod(np.arange(self.model.cells), why)
