@@ -24,7 +24,6 @@ from hybrid.kernels.state.report import (
     BENDING_SLIP,
     DRAG,
     FORCES,
-    MAY_MEET,
     MAY_TOUCH,
     SELF_CONTACT,
     SELF_FRICTION,
@@ -469,19 +468,13 @@ class Touching:
         return line._replace(bits=(line.bits & ~(MAY_TOUCH | SELF_FRICTION)) | more)
 
 
-def touching_of(system: Network, scenes: Mapping[str, LineScene]) -> Touching | None:
-    """Which lines of a system touch each other, as it asks; None: it does not.
-
-    scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
-    """
-    names = list(system.lines)
-    return touching_among(system, scenes, [(names.index(a), names.index(b)) for a, b in system.touching_pairs])
-
-
 def touching_among(
     system: Network, scenes: Mapping[str, LineScene], pairs: Iterable[tuple[int, int]]
 ) -> Touching | None:
-    """Lines of which these pairs, by number, touch each other; scenes: of the lines by name; None: there is no pair."""
+    """Lines of which these pairs, by number, touch each other; None: there is no pair.
+
+    scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
+    """
     names, pairs = list(system.lines), [*pairs]
     lines = sorted({k for pair in pairs for k in pair})
     if not lines:
@@ -502,11 +495,6 @@ def touching_among(
 # Of the contents of a line that may come to touch others.
 OTHERS = "contact with other lines"
 MEETS = Entry(OTHERS, True, "from where they come near each other; contact: {between: []} switches it off")
-
-
-def beside_others(line: Line) -> Line:
-    """The line with the bit of one that may come to touch others."""
-    return line._replace(bits=line.bits | MAY_MEET)
 
 
 def that_may_meet(system: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:

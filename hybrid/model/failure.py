@@ -6,6 +6,7 @@ own without mass.  What was clamped bends there no more, and no torque passes th
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -33,22 +34,22 @@ class Weakness(NamedTuple):
 def weaknesses(system: Network) -> tuple[Weakness, ...]:
     """All that may break, lines first."""
     names = list(system.lines)
-    found: list[tuple[str, tuple[tuple[int, int], ...], Failure, bool]] = []
+    found = list[Weakness]()
+
+    def may_break(text: str, ends: Iterable[tuple[int, int]], when: Failure, leaves: bool) -> None:
+        found.append(Weakness(text, tuple(ends), when.time or np.inf, when.tension or np.inf, leaves))
+
     for name, line in system.lines.items():
         if line.break_at is not None:
             k = int(line.break_at.end == "end")
             point = (line.start, line.end)[k]
-            text = f"line {name} breaks from point {point}"
-            found.append((text, ((names.index(name), k),), line.break_at, True))
+            may_break(f"line {name} breaks from point {point}", [(names.index(name), k)], line.break_at, True)
     for name, point_ in system.points.items():
         failure = getattr(point_, "break_at", None)
         if failure is not None:
-            ends = tuple((names.index(x), int(end == "end")) for x, end in system.lines_at(name))
-            found.append((f"point {name} gives way", ends, failure, False))
-    return tuple(
-        Weakness(text, ends, failure.time or np.inf, failure.tension or np.inf, leaves)
-        for text, ends, failure, leaves in found
-    )
+            ends = ((names.index(x), int(end == "end")) for x, end in system.lines_at(name))
+            may_break(f"point {name} gives way", ends, failure, False)
+    return tuple(found)
 
 
 def after_failure(model: NetworkModel, weakness: Weakness, t: float) -> NetworkModel:

@@ -15,9 +15,9 @@ from hybrid.kernels.state.report import BODIES, DRAG, FLOW, OBSTACLES, SURFACE
 from hybrid.kernels.state.state import Floats, Line, Sea, State, state_for
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
-from hybrid.model.material import Material
+from hybrid.model.material import Material, nodes_at
 from hybrid.model.sea import Surroundings
-from hybrid.model.sections import net_weight, swivels
+from hybrid.model.sections import net_weight
 from hybrid.scene.analysis import Equilibrium, Points, RodZone, Straight, ZonesModel
 from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion import EndMotion
@@ -357,7 +357,7 @@ def frames(scene: LineScene, e: Floats, line: Line, cable: Material) -> tuple[Fl
         n, soft = l.size, l * softness(line, cable)
         part = np.concatenate([[0.0], (np.cumsum(soft) - 0.5 * soft) / soft.sum(), [1.0]])
         rod = line.spin == 1
-        turning = [i for i in np.searchsorted(line.s, np.array(swivels(scene)) - 1e-9 * line.s[-1]) if line.element[i]]
+        turning = [i for i in nodes_at(cable.swivels, line.s) if line.element[i]]
         if turning:  # what lies beyond the last swivel takes it
             part = np.ones(n + 2)
             part[: turning[-1] + 1] = 0.0
@@ -383,7 +383,7 @@ def twist_by_tension(line: Line, cable: Material, state: State) -> None:
     soft = line.h / np.maximum(cable.B[cable.piece(0.5 * (line.s[:-1] + line.s[1:])), 2], 1e-300)
     turns = -2.0 * line.tension_twist * state.T
     holds = [held and tangent for held, tangent in zip(cable.held_twist, cable.held_tangent, strict=True)]
-    swivels = [i for i in cable.swivel_nodes(line.s).tolist() if line.element[i]]
+    swivels = [i for i in nodes_at(cable.swivels, line.s).tolist() if line.element[i]]
     loose = np.zeros(0, int) if line.torsion.size else np.flatnonzero(line.spin == 0)
     breaks = sorted([*swivels, *loose.tolist()])
     if all(holds) and not breaks:

@@ -52,7 +52,7 @@ from hybrid.kernels.state.state import (
     no_work,
     state_for,
 )
-from hybrid.model.material import Material, elastic_layer
+from hybrid.model.material import Material, elastic_layer, nodes_at
 from hybrid.scene.section_laws import Curve, Layer, slopes
 
 # What inertia the sections of rods have.
@@ -125,9 +125,9 @@ def made_of(material: Material, inertia: int = WITH_SECTIONS) -> Floats:
 
 def cable_on(material: Material, base: Floats, bits: int, inertia: int) -> Cable:
     """A material on base cells (n+1,) m; bits: forces that are on; inertia: as of `made_of`."""
-    of, place = material.piece(0.5 * (base[:-1] + base[1:])), material.point_nodes(base)
+    of, place = material.piece(0.5 * (base[:-1] + base[1:])), nodes_at(material.at, base)
     load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
-    load[place], turns[material.swivel_nodes(base)] = 1, 1
+    load[place], turns[nodes_at(material.swivels, base)] = 1, 1
     points = np.zeros((len(OF_POINTS), base.size))
     cable = Cable(
         made=made_of(material, inertia)[of], EI=material.mean_bending[of], w=np.abs(material.submerged_weight[of]),

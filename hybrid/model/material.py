@@ -215,18 +215,15 @@ class Material:
         """Piece that each of the arc lengths s (m) lies in."""
         return np.searchsorted(self.bounds[1:-1], s)
 
-    def swivel_nodes(self, s: Floats) -> np.ndarray:
-        """Of nodes at s (N+1,) m, those of swivels."""
-        return np.searchsorted(s, self.swivels - 1e-9 * s[-1])
-
-    def point_nodes(self, s: Floats) -> np.ndarray:
-        """Of nodes at s (N+1,) m, those (P,) where points are."""
-        return np.searchsorted(s, self.at - 1e-9 * s[-1])
-
     @property
     def cuts(self) -> list[float]:
         """Arc lengths at which a node must lie."""
         return sorted({*self.edges.tolist(), *self.at[(self.at > 0.0) & (self.at < self.bounds[-1])].tolist()})
+
+
+def nodes_at(places: Floats, s: Floats) -> np.ndarray:
+    """Of nodes at s (N+1,) m, those at places (P,) m where there is one but for round-off."""
+    return np.searchsorted(s, places - 1e-9 * s[-1])
 
 
 def tension_floor(EI: Floats, w: Floats, scale: float) -> Floats:

@@ -21,7 +21,7 @@ from hybrid.kernels.mesh.remesh import Cable, blank_kinds_job, blank_line_job, f
 from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
 from hybrid.kernels.state.state import NO_MOVED, NO_PLANE, Floats, Line
 from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
-from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material
+from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material, nodes_at
 
 MOST_CELLS = 1_000_000
 DEFAULT_CELLS = 100  # of a line whose scene gives none: errors of a smooth sag near 1e-4 of the length
@@ -364,7 +364,7 @@ class LineOnBase:
 
     def __init__(self, material: Material, base: Floats) -> None:
         """base: (n+1,) m, nodes that are always there."""
-        self._material, self._place, self._bits = material, material.point_nodes(base), 0
+        self._material, self._place, self._bits = material, nodes_at(material.at, base), 0
         self._cable = cable_on(material, base, 0, inertia_of_zones(material))
         self._line_job, self._kinds_job = Table(blank_line_job), Table(blank_kinds_job)
 

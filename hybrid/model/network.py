@@ -13,7 +13,7 @@ from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MASS, MOM
 from hybrid.kernels.junctions.joined_lines import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.report import MEETS_FROM, MEETS_TO, OBSTACLES, ONSET_OF, STRAND, TURNED
+from hybrid.kernels.state.report import MAY_MEET, MEETS_FROM, MEETS_TO, OBSTACLES, ONSET_OF, STRAND, TURNED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import (
@@ -37,10 +37,9 @@ from hybrid.model.contents import (
     MEETS,
     Entry,
     Touching,
-    beside_others,
     obstacle_entries,
     that_may_meet,
-    touching_of,
+    touching_among,
 )
 from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.initial_shape import dead_loads, first_state, hung
@@ -222,11 +221,16 @@ def build_system(
         models = _on_obstacles(system, models, made)
     rides = _leave_own_bodies(system, models)
     scenes = {name: system.scene_of(name) for name in system.lines}
-    touching = touching_of(system, scenes)
+    names = list(system.lines)
+    pairs = ((names.index(a), names.index(b)) for a, b in system.touching_pairs)
+    touching = touching_among(system, scenes, pairs)
     if touching is not None:
         models = _with_contact(system, models, touching)
     may_meet = that_may_meet(system, scenes)
-    models = [_beside_others(x) if k in may_meet else x for k, x in enumerate(models)]
+    for k in may_meet:
+        x = models[k]
+        line = x.line._replace(bits=x.line.bits | MAY_MEET)
+        models[k] = replace(x, line=line, contents=(*x.contents, MEETS))
     if _has_drag(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     ends = [(x.start, x.end) for x in system.lines.values()]
@@ -387,11 +391,6 @@ def _with_contact(system: Network, models: Sequence[Model], touching: Touching) 
         x = found[k]
         found[k] = replace(x, line=touching.bits(x.line), contents=(*x.contents, entry))
     return found
-
-
-def _beside_others(model: Model) -> Model:
-    """The model of a line that touches others from where it comes near them."""
-    return replace(model, line=beside_others(model.line), contents=(*model.contents, MEETS))
 
 
 def _has_drag(system: Network, models: Sequence[Model]) -> bool:

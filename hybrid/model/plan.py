@@ -369,9 +369,8 @@ class Plan:
     steps: int
     step: float  # s, of most steps
     seconds: float  # of processor time, of all runs that are expected
-    runs: int = (
-        1  # until there is a first result with its errors: the mesh pre-run and three to compare with among them
-    )
+    # Until there is a first result with its errors: the mesh pre-run and three to compare with among them.
+    runs: int = 1
     most_runs: int = 1  # if that misses the accuracy that is asked
     # The same of every model that a pre-run chooses from; none: the scene names its model.  The rest is as for rods.
     choice: tuple[tuple[str, float], ...] = ()

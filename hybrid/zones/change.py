@@ -19,6 +19,7 @@ from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model
+from hybrid.model.material import nodes_at
 from hybrid.model.mesh import Layout, LineOnBase, on_other_parts
 from hybrid.solve.stepper import NetworkTaken
 from hybrid.store.integrity import matched
@@ -89,14 +90,14 @@ class ZoneSwitching:
         self.guided = np.array(model.cable.held_tangent, float)
         base = manager.layout.base
         self.kinks = np.zeros(base.size, bool)
-        self.kinks[model.cable.point_nodes(base)] = True
+        self.kinks[nodes_at(model.cable.at, base)] = True
         self._set_line(model.line, model.line.h)
 
     def set_cells(self, model: Model) -> None:
         """Go on with a model whose line has all of its stiffness and its true lengths: cells have come or gone."""
         self.model = model
         self.kinks = np.zeros(model.zoned.base.size, bool)
-        self.kinks[model.cable.point_nodes(model.zoned.base)] = True
+        self.kinks[nodes_at(model.cable.at, model.zoned.base)] = True
         self._set_line(model.line, model.line.h)
         self.zones.true[:] = np.diff(model.line.s)
 
