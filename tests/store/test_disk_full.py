@@ -9,14 +9,25 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import h5py
+import numpy as np
 import pytest
 
 import hybrid
+from hybrid.simulation import run as run_module
+from hybrid.simulation.line_result import LineResult
+from hybrid.store import whole_file as store
+from hybrid.store import writer
 from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.format import Field, Header, MemoryTarget
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import open_result
+from hybrid.store.writer import Recorder
+from tests.scenes import line_between, network_scene
 
 WRITER = """
 import resource, sys
@@ -135,3 +146,166 @@ def test_what_was_written_of_several_lines_stays(limit: int, tmp_path: Path) -> 
         t = line.times
         assert len(t) >= len(result.times) and (t == range(len(t))).all() and (line.tension[:, 0] == 10.0 * t).all()
     assert bool(len(result.times)) == (limit > 1_000_000)
+
+
+# Files begin as templates; one that is missing or spoilt changes nothing in the result.
+
+
+FIELDS = (Field("tension", "N", "tension", (5,), ("s",)), Field("energy/kinetic", "J", "kinetic energy"))
+HEIGHTS = Field("z", "m", "heights of the current", (2,), ("z",))
+
+
+def write(folder: Path, path: Path, fields: tuple[Field, ...] = FIELDS, length: float = 2.0) -> None:
+    """A result of one output; its template kept in the folder, or found there by what would be a new process."""
+    store._known.clear()
+    s = np.linspace(0.0, length, 5)
+    fixed = [(HEIGHTS, np.array([0.0, -length]))]
+    with Recorder(
+        path, Header(s, fields, (), {"title": "made up"}, {"scene": "a: 1"}, fixed), overwrite=True, templates=folder
+    ) as recorder:
+        recorder.save(0.0, {f.name: np.ones(f.shape) for f in fields}, [("rod", 0.0, length)])
+
+
+def content(path: Path) -> dict[str, tuple[str, list[object], list[tuple[str, str]]]]:
+    """Datasets with their labels, values and attributes, but for references, which are places in the file."""
+    out = {}
+    with h5py.File(path) as file:
+
+        def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
+            attrs = {k: v for k, v in item.attrs.items() if k not in ("created", "REFERENCE_LIST", "DIMENSION_LIST")}
+            texts = sorted((k, str(v)) for k, v in attrs.items())
+            values = np.asarray(item[()]).tolist() if isinstance(item, h5py.Dataset) else []
+            scales = [d[0].name for d in item.dims if len(d)] if isinstance(item, h5py.Dataset) else []
+            out[name] = (str(scales), values, texts)
+
+        visit("/", file)
+        file.visititems(visit)
+    return out
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Path:
+    """The one template of a folder, after a result was written that had none."""
+    write(tmp_path / "templates", tmp_path / "first.h5")
+    (found,) = (tmp_path / "templates").iterdir()
+    return found
+
+
+def test_a_template_that_was_kept_is_used_and_gives_the_same_file(
+    kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> bytes:
+        raise AssertionError("made anew")
+
+    monkeypatch.setattr(store, "_template", refused)
+    write(kept.parent, tmp_path / "second.h5")
+    assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5")
+    write(kept.parent, tmp_path / "longer.h5", length=3.0)  # values are no part of it
+    assert open_result(tmp_path / "longer.h5").s[-1] == 3.0 and open_result(tmp_path / "longer.h5")["z"][1] == -3.0
+    with pytest.raises(AssertionError, match="made anew"):
+        write(kept.parent, tmp_path / "other.h5", FIELDS[:1])
+
+
+@pytest.mark.parametrize("harm", ["empty", "cut off", "a changed byte", "a folder"])
+def test_a_spoilt_template_is_made_anew(harm: str, kept: Path, tmp_path: Path) -> None:
+    data = kept.read_bytes()
+    kept.unlink()
+    if harm == "a folder":
+        kept.mkdir()
+    else:
+        middle = len(data) // 2
+        changed = data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
+        kept.write_bytes({"empty": b"", "cut off": data[:middle], "a changed byte": changed}[harm])
+    write(kept.parent, tmp_path / "second.h5")
+    assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5")
+    assert harm == "a folder" or kept.read_bytes() == data
+
+
+def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    write(tmp_path / "file", tmp_path / "first.h5")
+    assert len(open_result(tmp_path / "first.h5").times) == 1
+
+
+@pytest.mark.parametrize("what", ["h5py", "hybrid-cable"])
+def test_other_versions_have_other_templates(what: str, kept: Path, tmp_path: Path) -> None:
+    versions = store.versions()
+    before = versions[what]
+    try:
+        versions[what] = "0.0"
+        store._makers.cache_clear()
+        write(kept.parent, tmp_path / "second.h5")
+    finally:
+        versions[what] = before
+        store._makers.cache_clear()
+        store._known.clear()
+    assert len(list(kept.parent.iterdir())) == 2
+    assert open_result(tmp_path / "second.h5").versions[what] == "0.0"
+
+
+def test_old_templates_are_deleted(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "_KEPT", 2)
+    for n in (6, 7, 8):
+        write(kept.parent, tmp_path / "next.h5", (*FIELDS, Field("more", "", "numbers", (n,), ("k",))))
+    assert len(list(kept.parent.iterdir())) == 2 and not kept.exists()
+
+
+# How often a run hands over what it has: by what making and writing it take.
+
+
+GIVEN = Header(np.zeros(1), (), (), {})
+
+
+@pytest.fixture(params=["memory", "file"])
+def recorder(request: pytest.FixtureRequest, tmp_path: Path, now: list[float]) -> Iterator[Any]:
+    target = MemoryTarget() if request.param == "memory" else tmp_path / "x.h5"
+    with writer.Recorder(target, GIVEN) as recorder:
+        yield recorder
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """A clock that stands still, s."""
+    time = [100.0]
+    monkeypatch.setattr(writer, "monotonic", lambda: time[0])
+    return time
+
+
+def test_what_is_dear_to_make_waits_ten_times_as_long(recorder: Any, now: list[float]) -> None:
+    for made, pause in ((0.0, 0.2), (0.01, 0.2), (1.0, 10.0)):
+        recorder.flush(made)
+        now[0] += 0.99 * pause
+        assert not recorder.due
+        now[0] += 0.02 * pause
+        assert recorder.due
+
+
+def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether the clock says so or not: the results are the same.
+
+    The clock is asked between compiled steps: here after five outputs, or all of the run would wait in their buffer.
+    """
+    monkeypatch.setattr(run_module, "ROWS", 5)
+    rope = {"length": 101.0, "mass": 5.0, "diameter": 0.03, "axial_stiffness": 1e6}
+    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [100, 0, 0]}}
+    points["b"]["motion"] = {"heave": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}
+    scene = network_scene(points, {"l": line_between("a", "b", rope, mesh=10)}, time=(1.0, 0.05), output=(0.05, 5))
+    calls: list[int] = []
+    write_down = LineResult.write_down
+
+    def counted(line: LineResult) -> None:
+        calls.append(sum(len(batch.t) for batch in line._waiting))
+        write_down(line)
+
+    monkeypatch.setattr(LineResult, "write_down", counted)
+    found = []
+    for pause in (0.0, 100.0):
+        monkeypatch.setattr(writer, "pause", lambda _, pause=pause: pause)
+        calls.clear()
+        with hybrid.run(scene) as result:
+            found.append(
+                {name: np.array(result.lines["l"][name]) for name in ("position", "tension", "energy/kinetic")}
+            )
+        assert (max(calls) > 15) == (pause > 0.0)
+    for name, x in found[0].items():
+        np.testing.assert_array_equal(x, found[1][name])

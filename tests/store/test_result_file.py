@@ -16,16 +16,21 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy import api
 from hybrid.errors import ResultError
 from hybrid.exports.api import export
+from hybrid.simulation.case import Case
+from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field, Header
 from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
 from hybrid.store.reader import Result, open_result
 from hybrid.store.recorder import Rows
-from hybrid.store.records import Event, Zone
+from hybrid.store.records import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, Event, Zone
 from hybrid.store.selection import MARK
 from hybrid.store.writer import Recorder
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 S = np.linspace(0.0, 2.0, 5)
 FIELDS = (
@@ -502,3 +507,143 @@ def test_what_is_known_of_a_dataset_of_many_goes_when_it_is_closed(tmp_path: Pat
         assert file.id.get_mdc_size()[3] < 40  # entries of 20 datasets that were closed
     with h5py.File(tmp_path / "many.h5") as file:
         assert all(file[f"x{k}"].shape == (5,) for k in range(20))
+
+
+# Files of older versions are read under the names of today, and answer to the old ones too.
+
+
+def named(path: Path, old: bool) -> Path:
+    """A small result with end forces at every step, its error, and an event; `old`: as version 0.5 named them."""
+    word = "pull" if old else "end_force"
+    log = [Field("t", "s", "end of the step"), Field(f"{word}_end", "N", "force at the end")]
+    fields = [Field(f"errors/model/{word}_end", "N", "error of it")]
+    recorder = Recorder(
+        path, Header(np.array([0.0, 1.0]), fields, log, {"title": "", f"error_total_{word}": 3.0}, {"scene": ""})
+    )
+    kinds = {"turned in": "end rotated in", "snap": "snap"}
+    with recorder:
+        for k in range(3):
+            recorder.log({"t": 1.0 + k, f"{word}_end": 10.0 + k})
+            recorder.save(float(k), {f"errors/model/{word}_end": 0.1 * k}, [("rod", 0.0, 1.0)])
+        for before, now in kinds.items():
+            recorder.event(0.0, 0.0, 1.0, before if old else now, "text")
+        omitted = ("events left out", "turned in") if old else ("events omitted", "end rotated in")
+        recorder.event(0.0, 0.0, 1.0, omitted[0], "text", criterion=omitted[1])
+    return path
+
+
+def test_a_file_of_an_older_version_has_the_names_of_today(tmp_path: Path) -> None:
+    old, new = (hybrid.open(named(tmp_path / f"{x}.h5", x)) for x in (True, False))
+    assert old.names == new.names and old.attributes.keys() == new.attributes.keys()
+    assert [e.kind for e in old.events] == [e.kind for e in new.events] == ["end rotated in", "snap", "events omitted"]
+    assert old.events[-1].criterion == "end rotated in"
+    for name in ("steps/end_force_end", "errors/model/end_force_end"):
+        np.testing.assert_array_equal(old[name], new[name])
+        assert old.dims(name) == new.dims(name) and old.label(name) == new.label(name)
+        assert old.describe(name) == new.describe(name)
+
+
+def test_old_names_are_understood_in_old_and_new_files(tmp_path: Path) -> None:
+    for old in (True, False):
+        result = hybrid.open(named(tmp_path / f"{old}.h5", old))
+        assert result.steps["pull_end"].tolist() == result.steps.end_force_end.tolist() == [10.0, 11.0, 12.0]
+        assert "steps/pull_end" in result and "pull_end" in result.steps and "pull_end" not in list(result.steps)
+        assert result.attributes["error_total_pull"] == result.attributes["error_total_end_force"] == 3.0
+        assert result.at(t=0.5, names=["errors/model/pull_end"])["errors/model/pull_end"] == 0.05
+
+
+def test_no_name_is_both_old_and_new() -> None:
+    for table in (OLD_NAMES, OLD_ATTRIBUTES, OLD_EVENTS):
+        assert not set(table) & set(table.values())
+
+
+def test_the_file_itself_was_written_with_the_old_names(tmp_path: Path) -> None:
+    """What the other tests stand on."""
+    with h5py.File(named(tmp_path / "old.h5", True), "r") as file:
+        assert "steps/pull_end" in file and "error_total_pull" in file.attrs
+
+
+# `result.mesh[i]`: the cells at every output, whatever the output grid is.
+
+
+def swinging(model, **more):
+    """A line whose end swings so fast at first that zones change."""
+    section = {"length": 20.0, "mass": 1.0, "bending_stiffness": 5.0, "axial_stiffness": 1e5}
+    motion = {"surge": {"amplitude": 3.0, "period": 4.0}, "ramp": 2.0}
+    data = cable_scene(
+        section,
+        clamped_at([0, 0, 0], [0, 0, -1]),
+        pinned_at(8, 0, 0, motion=motion),
+        model=model,
+        time=(6.0, 0.02),
+        output=(0.1, 7),
+    )
+    return hybrid.validate_scene(data | more)
+
+
+@pytest.mark.parametrize(
+    "model", ["rod", "catenary", {"zones": [{"rod": 5, "cells": 20}, {"catenary": 15, "cells": 9}]}]
+)
+def test_a_mesh_that_stays(model):
+    result = hybrid.static(swinging(model))
+    assert len(result.mesh) == 1
+    nodes, kinds = result.mesh[-1]
+    assert nodes[0] == 0.0 and nodes[-1] == 20.0 and (np.diff(nodes) > 0.0).all()
+    assert nodes.size == kinds.size + 1 == result.attributes["cells"] + 1
+    if isinstance(model, str):
+        assert set(kinds) == {model}
+    else:
+        assert kinds.tolist() == ["rod"] * 20 + ["catenary"] * 9
+        np.testing.assert_allclose(np.diff(nodes[20:]), 15 / 9)
+        assert repr(result.mesh[0]) == "<mesh of 29 cells of 0.25 to 1.667 m: 9 catenary, 20 rod>"
+
+
+def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
+    """At every output the nodes are those that the step was computed on."""
+    seen = {}
+
+    class Spy(Case):
+        def _loop(self, *args):
+            loop = super()._loop(*args)
+            record = loop._record
+
+            def recorded(batch, errors):
+                line = loop.run.model.line
+                for t in batch.t.tolist():
+                    seen[t] = line.s.copy(), line.spin.astype(bool).copy()
+                return record(batch, errors)
+
+            loop._record = recorded
+            return loop
+
+    def shown(self, batch):
+        for t in batch.t.tolist():
+            seen[t] = self.model.line.s.copy(), self.model.line.spin.astype(bool).copy()
+        return output(self, batch)
+
+    output = LineResult.output
+    monkeypatch.setattr(LineResult, "output", shown)
+    monkeypatch.setattr(api, "Case", Spy)
+    monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
+    result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")
+    kinds = {tuple(mesh.kinds) for mesh in result.mesh}
+    assert len(kinds) > 3 and len(result.mesh) == len(result.times) == len(seen)
+    for t, mesh in zip(result.times, result.mesh, strict=True):
+        nodes, rod = seen[float(t)]
+        np.testing.assert_array_equal(mesh.s, nodes)
+        np.testing.assert_array_equal(mesh.kinds == "rod", rod)
+    assert [m.s.size for m in result.mesh[3:5]] == [result.mesh[k].s.size for k in (3, 4)]
+    with pytest.raises(IndexError):
+        result.mesh[len(result.mesh)]
+
+
+def test_a_result_without_a_mesh_has_none(tmp_path):
+    """As results of before 0.6."""
+    path = tmp_path / "still.h5"
+    hybrid.static(swinging("catenary"), path).close()
+    with h5py.File(path, "r+") as file:
+        del file["mesh"]
+    result = hybrid.open(path)
+    assert not hasattr(result, "mesh")
+    with pytest.raises(ResultError, match="no 'mesh'"):
+        result.mesh  # noqa: B018
