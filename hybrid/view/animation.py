@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,8 +17,8 @@ import numpy as np
 from hybrid.errors import ResultError, command_for
 from hybrid.store.reader import Result
 from hybrid.view.curves import along, even
-from hybrid.view.figure import COMMENT, Band, Item, Line, Panel, check_target, colour_of, prefix, short, write_file
-from hybrid.view.lines import AllLines, bodies_in, film_page
+from hybrid.view.figure import COMMENT, Band, Item, Line, check_target, colour_of, prefix, short, write_file
+from hybrid.view.lines import AllLines, bodies_in, shapes, tensions, views_of_lines
 from hybrid.view.panels import cable, framed, page_of, profiles, sea
 from hybrid.view.projections import View, aspect_of, pieces_of, views_of
 from hybrid.view.scenery import speed_of
@@ -103,50 +104,64 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
     """Pixels (height, width, 4) of every frame; width: of the page, inches."""
     from hybrid.view.matplotlib_backend import film
 
-    whole, alone = result, AllLines(result).alone
-    if alone is None:
-        page, shown = film_page(result, factor)
-        return film(page, shown, frames, dpi)
-    result = alone
-    views = dict(zip(("shape", "second"), views_of(result), strict=False))
-    names, profile = list(views), profiles(result, "tension", title="tension, and its range over all times")
-    band = next(item for item in profile.items if isinstance(item, Band))
-    panels = {name: _still(result, view) for name, view in views.items()}
-    panels["tension"] = profile._replace(items=[band._replace(opacity=0.18)])
-    tall = aspect_of(list(views.values()), result) < 1.0
+    every = AllLines(result)
+    line = every.alone
+    around = every.as_result if line is None else line
+    drawn: Callable[[View, int], list[Item]]
+    tension: Callable[[int], list[Item]]
+    bands: list[Item]
+    if line is None:
+        views, width, panel = views_of_lines(every), WIDE, tensions(result, every)
+        legend = [(every.label(name), colour, 1.8) for name, colour in every.colours.items()]
+        bands = [item for item in panel.items if isinstance(item, Band)]
+        drawn, tension = partial(shapes, result, every), lambda i: tensions(result, every, i).items
+    else:
+        views, panel = views_of(line), profiles(line, "tension", title="tension, and its range over all times")
+        legend = [(x, colour_of(x), 2.0) for x in dict.fromkeys(zone.kind for zones in line.zones for zone in zones)]
+        bands = [next(item for item in panel.items if isinstance(item, Band))._replace(opacity=0.18)]
+        drawn, tension = lambda view, i: [*cable(line, view, i), *bodies_in(result, view, i)], _by_zones(line)
+    seen = dict(zip(("shape", "second"), views, strict=False))
+    none, first = np.zeros(0), "first shape" + "s" * (line is None)
+    panels = {}
+    for name, view in seen.items():  # what does not move; empty lines bring names into the legend
+        items: list[Item] = [*sea(around, view), *(Line(none, none, *x) for x in legend)]
+        items += [Line(*view.project(x.position[0]), first, "#B5B5B5", 0.8) for x in every.lines.values()]
+        panels[name] = framed(around, view, items)
+    names, panels["tension"] = list(seen), panel._replace(items=bands)
+    tall = line is not None and aspect_of(list(seen.values()), line) < 1.0
     mosaic: list[Any] = [[*names, "tension"]] if tall else [names, ["tension"] * len(names)]
     heights = None if tall else [2.2, 1.0]
     if width < _NARROW and not tall:
-        mosaic, heights = [[name] for name in panels], [2.2] * len(views) + [1.4]
+        mosaic, heights = [[name] for name in panels], [2.2] * len(names) + [1.4]
     # both sides even in pixels, as x264 wants them
     size = tuple(2.0 * round(0.5 * x * dpi) / dpi for x in (width, 5.12 if width >= _NARROW else 1.04 * width))
     look = {"mosaic": mosaic, "heights": heights, "legend": ["shape"], "size": size}
-    page = page_of(whole, [f"{factor:g} × real time"], panels=panels, **look)
-    span = float(np.ptp(result.times)) / max(len(result.times) - 1, 1)
+    page = page_of(result, [f"{factor:g} × real time"], panels=panels, **look)
+    span = float(np.ptp(every.times)) / max(every.outputs - 1, 1)
     places = int(np.clip(1 - np.floor(np.log10(span)), 0, 6))
-    curves = along(result, "tension")
-    scale, _ = prefix("N", float(np.abs(curves.values).max()))
-    left = np.where(np.diff(curves.s, append=np.inf) == 0.0, np.nextafter(curves.s, -np.inf), curves.s)
 
     def moving(i: int) -> tuple[str, dict[str, list[Item]]]:
-        shapes = {name: [*cable(result, view, i), *bodies_in(whole, view, i)] for name, view in views.items()}
-        tension: list[Item] = []
-        for kind, s in pieces_of(result, i):
-            last = np.nextafter(s[-1], -np.inf)  # the value on the left, where zones meet
-            where = np.array([s[0], *left[(left > s[0]) & (left < last)], last])
-            tension.append(Line(where, np.interp(where, left, curves.values[i] * scale), kind, colour_of(kind), 1.8))
-        return f"t = {result.times[i]:.{places}f} s", shapes | {"tension": tension}
+        items = {name: drawn(view, i) for name, view in seen.items()}
+        return f"t = {every.times[i]:.{places}f} s", items | {"tension": tension(i)}
 
     return film(page, moving, frames, dpi)
 
 
-def _still(result: Result, view: View) -> Panel:
-    """What does not move: the surroundings and the first shape; empty lines bring the kinds into the legend."""
-    kinds = dict.fromkeys(zone.kind for zones in result.zones for zone in zones)
-    none = np.zeros(0)
-    legend = [Line(none, none, kind, colour_of(kind), 2.0) for kind in kinds]
-    first = Line(*view.project(result.position[0]), "first shape", "#B5B5B5", 0.8)
-    return framed(result, view, [*sea(result, view), *legend, first])
+def _by_zones(line: Result) -> Callable[[int], list[Item]]:
+    """What draws the tension along a line at an output, in the colours of its zones."""
+    curves = along(line, "tension")
+    scale, _ = prefix("N", float(np.abs(curves.values).max()))
+    left = np.where(np.diff(curves.s, append=np.inf) == 0.0, np.nextafter(curves.s, -np.inf), curves.s)
+
+    def tension(i: int) -> list[Item]:
+        items: list[Item] = []
+        for kind, s in pieces_of(line, i):
+            last = np.nextafter(s[-1], -np.inf)  # the value on the left, where zones meet
+            where = np.array([s[0], *left[(left > s[0]) & (left < last)], last])
+            items.append(Line(where, np.interp(where, left, curves.values[i] * scale), kind, colour_of(kind), 1.8))
+        return items
+
+    return tension
 
 
 # ---- files ----------------------------------------------------------------------------------------

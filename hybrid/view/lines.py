@@ -391,33 +391,3 @@ def _page_of_many(result: Result, every: AllLines, views: list[View], panels: di
         result, facts_line(result, every), panels={x: panel for x, panel in panels.items() if x in shown},
         mosaic=rows, heights=[3.2, *[1.0] * (len(rows) - 1)], size=(8.0, 10.0), legend=["s"],
     )  # fmt: skip
-
-
-Moving = Any
-
-
-def film_page(result: Result, factor: float) -> tuple[Page, Moving]:
-    """The page of a film of several lines, and what moves on it: by output, the time in words and items by panel."""
-    every = AllLines(result)
-    views = dict(zip(("shape", "second"), views_of_lines(every), strict=False))
-    none = np.zeros(0)
-    legend: list[Item] = [Line(none, none, every.label(x), c, 1.8) for x, c in every.colours.items()]
-    panels: dict[str, Panel] = {}
-    for name, view in views.items():
-        first: list[Item] = [
-            Line(*view.project(line.position[0]), "first shapes", "#B5B5B5", 0.8) for line in every.lines.values()
-        ]
-        panels[name] = framed(every.as_result, view, [*sea(every.as_result, view), *legend, *first])
-    still = tensions(result, every)
-    panels["tension"] = still._replace(items=[item for item in still.items if isinstance(item, Band)])
-    names = list(views)
-    look = {"mosaic": [names, ["tension"] * len(names)], "heights": [2.2, 1.0], "legend": ["shape"]}
-    made = page_of(result, [f"{factor:g} × real time"], panels=panels, size=(8.0, 5.12), **look)
-    pause = float(np.ptp(every.times)) / max(every.outputs - 1, 1)
-    places = int(np.clip(1 - np.floor(np.log10(pause)), 0, 6))
-
-    def moving(i: int) -> tuple[str, dict[str, list[Item]]]:
-        items = {name: shapes(result, every, view, i) for name, view in views.items()}
-        return f"t = {every.times[i]:.{places}f} s", items | {"tension": tensions(result, every, i).items}
-
-    return made, moving

@@ -6,6 +6,7 @@ import runpy
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -36,16 +37,19 @@ ROD = SCENE.replace("diameter: 0.02", "diameter: 0.02, bending_stiffness: 20, to
 
 
 @contextmanager
-def running(unit: Path, folder: Path, **parameters: str) -> Iterator[tuple[FMU3Slave, dict[str, int]]]:
-    """An FMU that has been started, and the numbers of its variables."""
+def running(
+    unit: Path, folder: Path, said: list[str] | None = None, **parameters: str | bool
+) -> Iterator[tuple[FMU3Slave, dict[str, int]]]:
+    """An FMU that has been started, and the numbers of its variables; said: where its messages go."""
     fmpy.extract(unit, folder)
     description = fmpy.read_model_description(folder)
     number = {x.name: x.valueReference for x in description.modelVariables}
     name = description.coSimulation.modelIdentifier
     cable = FMU3Slave(guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName="line")
-    cable.instantiate()
+    log = None if said is None else lambda _, status, category, message: said.append(message.decode())
+    cable.instantiate(loggingOn=said is not None, logMessage=log)
     for key, value in parameters.items():
-        cable.setString([number[key]], [value])
+        (cable.setBoolean if isinstance(value, bool) else cable.setString)([number[key]], [value])
     cable.enterInitializationMode()
     cable.exitInitializationMode()
     try:
@@ -179,22 +183,10 @@ def test_places_at_the_begin_of_a_step_go_on_with_their_velocity(unit: Path, tmp
         cable.setFloat64([number["end.position.z"], number["end.velocity.z"]], [0.0, 0.4])
         step(cable, 0)
         assert cable.getFloat64([number["end.node_position.z"]]) == [0.0]
-    fmpy.extract(unit, tmp_path / "again")
-    description = fmpy.read_model_description(tmp_path / "again")
-    number = {x.name: x.valueReference for x in description.modelVariables}
-    name = description.coSimulation.modelIdentifier
-    cable = FMU3Slave(
-        guid=description.guid, unzipDirectory=str(tmp_path / "again"), modelIdentifier=name, instanceName="x"
-    )
-    cable.instantiate()
-    cable.setBoolean([number["inputs_at_begin"]], [True])
-    cable.enterInitializationMode()
-    cable.exitInitializationMode()
-    cable.setFloat64([number["end.velocity.z"]], [0.4])
-    step(cable, 0)
-    assert cable.getFloat64([number["end.node_position.z"]]) == pytest.approx([0.02])
-    cable.terminate()
-    cable.freeInstance()
+    with running(unit, tmp_path / "again", inputs_at_begin=True) as (cable, number):
+        cable.setFloat64([number["end.velocity.z"]], [0.4])
+        step(cable, 0)
+        assert cable.getFloat64([number["end.node_position.z"]]) == pytest.approx([0.02])
 
 
 def test_the_result_is_written_where_a_parameter_says(unit: Path, tmp_path: Path) -> None:
@@ -229,25 +221,57 @@ def test_a_wrong_step_is_an_error_in_words_and_the_next_one_works(
     unit: Path, tmp_path: Path, at: float, size: float, why: str
 ) -> None:
     said: list[str] = []
-    fmpy.extract(unit, tmp_path / "open")
-    description = fmpy.read_model_description(tmp_path / "open")
-    name = description.coSimulation.modelIdentifier
-    cable = FMU3Slave(
-        guid=description.guid, unzipDirectory=str(tmp_path / "open"), modelIdentifier=name, instanceName="x"
-    )
+    with running(unit, tmp_path / "open", said) as (cable, _):
+        with pytest.raises(Exception, match="fmi3DoStep"):
+            cable.doStep(currentCommunicationPoint=at, communicationStepSize=size)
+        assert any(why in text for text in said), said
+        step(cable, 0)
 
-    def log(_: Any, status: int, category: bytes, message: bytes) -> None:
-        said.append(message.decode())
 
-    cable.instantiate(loggingOn=True, logMessage=log)
-    cable.enterInitializationMode()
-    cable.exitInitializationMode()
-    with pytest.raises(Exception, match="fmi3DoStep"):
-        cable.doStep(currentCommunicationPoint=at, communicationStepSize=size)
-    assert any(why in text for text in said), said
-    step(cable, 0)
-    cable.terminate()
-    cable.freeInstance()
+def test_a_hundred_wrong_uses(unit: Path, tmp_path: Path) -> None:
+    """Times, sizes, inputs that are no numbers, after each of them a step as if nothing had been asked; then closed."""
+    said: list[str] = []
+    with running(unit, tmp_path / "open", said) as (cable, number):
+
+        def wrong(t: float, step: float, inputs: dict[str, float] | None = None) -> None:
+            before = len(said)
+            for key, value in (inputs or {}).items():
+                cable.setFloat64([number[key]], [value])
+            with pytest.raises(Exception, match="fmi3DoStep"):
+                cable.doStep(currentCommunicationPoint=t, communicationStepSize=step)
+            assert any(len(text) > 20 for text in said[before:]), (t, step, inputs)
+            for key in inputs or {}:
+                cable.setFloat64([number[key]], [10.0 if key == "end.position.x" else 0.0])
+
+        bad = (nan, inf, -inf)
+        count = 0
+        for k in range(4):
+            t = 0.05 * k
+            uses: list[tuple[Any, ...]] = [(at, 0.05) for at in (*bad, -1.0, t + 0.1, t - 0.05, 1e300, 2.0)]
+            uses += [(t, size) for size in (*bad, -0.05, 0.0, 5.0, 1e300, -1e300)]
+            keys = [f"{end}.{what}.{x}" for end in ("start", "end") for what in ("position", "velocity") for x in "xyz"]
+            uses += [(t, 0.05, {key: bad[(j + k) % 3]}) for j, key in enumerate(keys)]
+            for use in uses:
+                wrong(*use)
+            count += len(uses)
+            cable.doStep(currentCommunicationPoint=t, communicationStepSize=0.05)
+        force = cable.getFloat64([number["end.force.x"], number["end.force.z"]])
+        saved = cable.getFMUState()
+        wrong(0.2, 0.05, {"end.position.x": 30.0})  # the step fails, and goes on from the saved state
+        wrong(0.2, 0.05)
+        cable.setFMUState(saved)
+        assert cable.getFloat64([number["end.force.x"], number["end.force.z"]]) == force
+        cable.doStep(currentCommunicationPoint=0.2, communicationStepSize=0.05)
+        print(f"{count + 2} wrong uses of an FMU")
+        assert count + 2 > 100
+    with hybrid.Simulation(hybrid.parse_scene(SCENE)) as same:
+        same.set_end("start", [0, 0, 0])
+        same.set_end("end", [10, 0, 0])
+        same.advance(0.05)
+        same.advance(0.1)
+        same.advance(0.15)
+        same.advance(0.2)
+        assert force == pytest.approx([same.forces().end[0], same.forces().end[2]], rel=1e-9)
 
 
 def test_two_units_run_in_one_process(unit: Path, tmp_path: Path) -> None:

@@ -30,8 +30,7 @@ from hybrid.store.writer import Recorder
 from tests.scenes import line_between, network_scene
 
 WRITER = """
-import resource, sys
-sys.path[:0] = [{here!r}]
+import resource
 resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
 from hybrid.errors import ResultError
 from hybrid.store.writer import WriteMode
@@ -51,16 +50,22 @@ except ResultError as error:
 """
 
 
+def said_by(code: str) -> str:
+    """What a process of its own prints that runs code, and ends in order."""
+    path = os.pathsep.join(map(str, (Path(__file__).parent, Path(hybrid.__file__).parents[1])))
+    env = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
+    return done.stdout
+
+
 # bytes: before the file is made, while it is made, at its first outputs, later ones
 @pytest.mark.parametrize("limit", [0, 20_000, 60_000, 240_000, 300_000, 412_345, 777_777])
 @pytest.mark.long  # 3 s of 7 cases
 def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
-    path, here = tmp_path / "run.h5", Path(__file__).parent
-    code = WRITER.format(here=str(here), limit=limit, path=str(path))
-    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
-    assert str(path) in done.stdout and "cannot be written" in done.stdout and "free" in done.stdout
+    path = tmp_path / "run.h5"
+    said = said_by(WRITER.format(limit=limit, path=str(path)))
+    assert str(path) in said and "cannot be written" in said and "free" in said
     assert {x.name for x in tmp_path.iterdir()} <= {"run.h5"}, "something is left behind"
     assert path.exists() == (limit > 50_000), "a file that could not be made must not appear"
     if not path.exists():
@@ -76,8 +81,7 @@ def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
 
 
 LATE = """
-import os, resource, sys
-sys.path[:0] = [{here!r}]
+import os, resource
 from hybrid.errors import ResultError
 from hybrid.store.writer import WriteMode
 from test_result_file import ONE, recorder, values
@@ -101,18 +105,14 @@ for limit in (0, 20_000, size // 2, size - 10):  # while it is made, in its outp
 
 def test_a_late_file_that_cannot_be_written_does_not_appear(tmp_path: Path) -> None:
     """And what was there before stays."""
-    path, here = tmp_path / "run.h5", Path(__file__).parent
-    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
-    code = LATE.format(here=str(here), path=str(path))
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
-    assert done.stdout.count(f"{path} cannot be written") == 4 and "free" in done.stdout
+    path = tmp_path / "run.h5"
+    said = said_by(LATE.format(path=str(path)))
+    assert said.count(f"{path} cannot be written") == 4 and "free" in said
     assert open_result(path).status == "complete"
 
 
 LINES = """
-import resource, sys
-sys.path[:0] = [{here!r}]
+import resource
 from hybrid.errors import ResultError
 from test_result_file import GIVEN, ONE, recorder, values
 from hybrid.store.recorder import Rows
@@ -135,12 +135,9 @@ except ResultError as error:
 @pytest.mark.parametrize("limit", [531_782, 1_289_002])
 def test_what_was_written_of_several_lines_stays(limit: int, tmp_path: Path) -> None:
     """Lines have all outputs that their system has, with their numbers."""
-    path, here = tmp_path / "run.h5", Path(__file__).parent
-    code = LINES.format(here=str(here), limit=limit, path=str(path))
-    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
-    assert str(path) in done.stdout and "cannot be written" in done.stdout and "free" in done.stdout
+    path = tmp_path / "run.h5"
+    said = said_by(LINES.format(limit=limit, path=str(path)))
+    assert str(path) in said and "cannot be written" in said and "free" in said
     result = open_result(path)
     for line in result.lines.values():
         t = line.times
