@@ -24,7 +24,7 @@ from hybrid.view.curves import along, even
 from hybrid.view.figure import BED, BODY, INK, colour_of
 from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
 from hybrid.view.projections import bed_heights, rings, whole_zones
-from hybrid.view.scenery import box_and_planes
+from hybrid.view.scenery import box_and_planes, marked_on
 from hybrid.view.summary import facts_of
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
@@ -240,14 +240,11 @@ def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
     line, *others = (x for _, x in result.each_line())
     if others:
         return out
-    s, position = line.s, line.position[outputs]
-    if "attached" in line and len(s) > 1:
-        where = np.clip(line["attached"], s[0], s[-1])
-        mark("float, clump, body", "circle", BODY, line.at(s=where, names=["position"])["position"][outputs])
-    if "touchdown_position" in line:
-        places, edges = line["touchdown_position"][outputs].copy(), line["touchdown"][outputs]
-        places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan
-        mark("touchdown", "diamond", BED, places)
+    position, (attached, touchdown) = line.position[outputs], marked_on(line, outputs)
+    if attached is not None:
+        mark("float, clump, body", "circle", BODY, attached)
+    if touchdown is not None:
+        mark("touchdown", "diamond", BED, touchdown)
     if not points:
         mark("start (s = 0)", "square", INK, position[:, :1])
         mark("end", "diamond", INK, position[:, -1:])

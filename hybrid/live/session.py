@@ -25,7 +25,7 @@ from hybrid.live.document import (
 from hybrid.live.workers import WatchedRun, Workers
 from hybrid.scene.read import text_of
 from hybrid.store.hdf5_file import is_held, is_result
-from hybrid.store.reader import Result, open_result
+from hybrid.store.reader import open_result
 
 WATCH = 0.02  # s, between two looks at the scene file,
 FOLLOW = 0.2  # s, and at a result
@@ -95,8 +95,6 @@ class Session:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await self.workers.stop()
-        if self.playback is not None:
-            self.playback.close()
 
     # ---- browsers -----------------------------------------------------------------------------
 
@@ -275,8 +273,7 @@ class Session:
         if self.document is None:
             return {"refused": "modes are of a scene: open it in place of its result"}
         asked = {"do": "modes", "text": self.document.text, "file": self.document.name}
-        answer = await self.workers.ask_spare(asked)
-        return _page(answer)
+        return _page(await self.workers.ask_spare(asked))
 
     # ---- the motion ---------------------------------------------------------------------------
 
@@ -291,8 +288,6 @@ class Session:
         if target.exists() and not replace:
             client.send(_message("ask", what="replace", file=target.name))
             return
-        if self.playback is not None:
-            self.playback.close()
         self.playback = None
         self.run = WatchedRun(document.path, target, self._send_state)
         work = asyncio.create_task(self._run_to_end(self.run))
@@ -381,12 +376,8 @@ class Session:
             self.send_all(state)
 
 
-_ENDED = json.dumps(
-    {
-        "problems": [{"line": None, "where": "process", "given": "", "text": "the process that computes was ended"}],
-        "notes": [],
-    }
-).encode()
+_PROBLEM = {"line": None, "where": "process", "given": "", "text": "the process that computes was ended"}
+_ENDED = json.dumps({"problems": [_PROBLEM], "notes": []}).encode()
 
 
 def _message(kind: str, /, **content: Any) -> str:
@@ -446,7 +437,6 @@ class Playback:
         self.status = ""
         self.running = False
         self.problem = ""
-        self._result: Result | None = None
         self._cost, self._last = 0.0, -1e9
         self._stamp: Stamp | None = None
 
@@ -474,22 +464,14 @@ class Playback:
             return before, True
         except Exception as error:  # not complete yet, being replaced, or no result: the page says so
             changed, self.problem = str(error) != self.problem, str(error)
-            self.close()
             return len(self.frames), changed and not self.running
         finally:
             self._last = clock.monotonic()
             self._cost = self._last - begin
 
-    def close(self) -> None:
-        """Let go of the file."""
-        if self._result is not None:
-            self._result.close()
-            self._result = None
-
     def _read(self) -> int:
         with open_result(self.path) as result:
-            outputs = len(next(x for _, x in result.each_line()).times)
-            outputs = min(outputs, len(result.times))
+            outputs = min(len(next(x for _, x in result.each_line()).times), len(result.times))
             if outputs < self._next:  # another run has begun
                 self.frames, self.stride, self._next = [], 1, 0
             before = len(self.frames)

@@ -262,7 +262,7 @@ def extreme_of(
     """
     sign = -1.0 if smallest else 1.0
     extremes.check(duration, probability)
-    _refuse_round_off(result, name, unit, x)
+    _refuse_round_off(result, unit, x)
     _refuse_regular(t, sign * x)
     found = extremes.of_record(t, sign * x, duration, None if threshold is None else sign * threshold, probability)
     most = HALF_TURN.get(unit)
@@ -277,7 +277,7 @@ def extreme_of(
     return found if not smallest else _negated(found)
 
 
-def _refuse_round_off(result: StoredResult, name: str, unit: str, x: Floats) -> None:
+def _refuse_round_off(result: StoredResult, unit: str, x: Floats) -> None:
     """ResultError for a history that ranges over no more than round-off of its own size, or of forces and lengths."""
     spread, size = float(np.ptp(x)), float(np.abs(x).max())
     least, of = STEADY * size, f"{size:.3g} {unit}, its size"

@@ -111,10 +111,10 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width
     tension: Callable[[int], list[Item]]
     bands: list[Item]
     if line is None:
-        views, width, panel = views_of_lines(every), WIDE, tensions(result, every)
+        views, width, panel = views_of_lines(every), WIDE, tensions(every)
         legend = [(every.label(name), colour, 1.8) for name, colour in every.colours.items()]
         bands = [item for item in panel.items if isinstance(item, Band)]
-        drawn, tension = partial(shapes, result, every), lambda i: tensions(result, every, i).items
+        drawn, tension = partial(shapes, result, every), lambda i: tensions(every, i).items
     else:
         views, panel = views_of(line), profiles(line, "tension", title="tension, and its range over all times")
         legend = [(x, colour_of(x), 2.0) for x in dict.fromkeys(zone.kind for zones in line.zones for zone in zones)]

@@ -204,10 +204,10 @@ def shape(result: Result, every: AllLines, view: View) -> Panel:
     return framed(every.as_result, view, items, when)
 
 
-def tensions(result: Result, every: AllLines, output: int | None = None) -> Panel:
+def tensions(every: AllLines, output: int | None = None) -> Panel:
     """Tension along every line: the last one over the range of all times; output: that one, without ranges."""
     title = "tension along the lines" + ", and its range over all times" * (every.outputs > 1 and output is None)
-    return _along_lines(result, every, "tension", "tension", "N", title, output)
+    return _along_lines(every, "tension", "tension", "N", title, output)
 
 
 def tension_ranges(every: AllLines) -> Panel:
@@ -227,16 +227,14 @@ def tension_ranges(every: AllLines) -> Panel:
     return Panel("ranked", title, Axis("tension", unit, peak=peak * factor), y, items, caption=caption)
 
 
-def moments(result: Result, every: AllLines) -> Panel | None:
+def moments(every: AllLines) -> Panel | None:
     """The same of the bending moment; None: no line has any."""
     bent = any("bending_moment" in x and np.abs(x["bending_moment"]).max() > 0.0 for x in every.lines.values())
     title = "bending moment along the lines" + ", and its range" * (every.outputs > 1)
-    return _along_lines(result, every, "bending_moment", "moment", "N m", title, None) if bent else None
+    return _along_lines(every, "bending_moment", "moment", "N m", title, None) if bent else None
 
 
-def _along_lines(
-    result: Result, every: AllLines, name: str, word: str, unit: str, title: str, output: int | None
-) -> Panel:
+def _along_lines(every: AllLines, name: str, word: str, unit: str, title: str, output: int | None) -> Panel:
     """A quantity along the lines that have it; word: for its axis."""
     lines = {x: line for x, line in every.lines.items() if name in line}
     peak = max(float(np.abs(line[name]).max()) for line in lines.values())
@@ -255,7 +253,7 @@ def _along_lines(
     return Panel(name, title, Axis("s", "m"), Axis(word, unit, peak=peak * factor), items)
 
 
-def largest_tensions(result: Result, every: AllLines) -> Panel:
+def largest_tensions(every: AllLines) -> Panel:
     """The largest tension of every line over time."""
     found = {name: line.tension[: every.outputs].max(axis=1) for name, line in every.lines.items()}
     peak = max(float(np.abs(x).max()) for x in found.values())
@@ -357,14 +355,14 @@ def page(result: Result) -> Page:
     names = ["s", "S"][: len(views)]
     panels = {name: shape(result, every, view) for name, view in zip(names, views, strict=True)}
     many = len(every.named) < len(every.lines)
-    panels["p"] = tension_ranges(every) if many else tensions(result, every)
+    panels["p"] = tension_ranges(every) if many else tensions(every)
     if every.outputs > 1:
-        panels["h"] = largest_tensions(result, every)
+        panels["h"] = largest_tensions(every)
         moved = sorted([*motions(result, every), *rotations(result, every)], key=lambda x: -x[0])
         panels |= dict(zip("mn", [panel for _, panel in moved], strict=False))
     if many:
         return _page_of_many(result, every, views, panels)
-    if (bent := moments(result, every)) is not None:
+    if (bent := moments(every)) is not None:
         panels["b"] = bent
     below = [name for name in "pbhmn" if name in panels][:4]
     panels = {name: x for name, x in panels.items() if name in (*names, *below)}

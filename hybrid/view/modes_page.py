@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -72,18 +72,19 @@ def _page(found: Any) -> Page:
         panels[str(k)] = Panel(str(k), title, Axis("", "m", *span[0]), Axis("", "m", *span[1]), items, aspect=1.0)
     if not panels:
         return Page(found.title or "(no title)", "", empty="no mode")
-    columns = min(COLUMNS, len(panels))
+    mosaic, size = grid_of(panels, COLUMNS, SHAPE_WIDE, SHAPE_HIGH, 0.6)
+    return Page(found.title or "(no title)", FACTS, 1, panels, mosaic, size=size)
+
+
+def grid_of(
+    panels: Collection[str], most: int, wide: float, high: float, room: float
+) -> tuple[list[list[str]], tuple[float, float]]:
+    """Panels in rows of at most so many, and the size of their page; wide, high: of each; room: for the head."""
+    columns = min(most, len(panels))
     rows = math.ceil(len(panels) / columns)
     keys = [*panels, *["."] * (rows * columns - len(panels))]
     mosaic = [keys[columns * row : columns * (row + 1)] for row in range(rows)]
-    return Page(
-        found.title or "(no title)",
-        FACTS,
-        1,
-        panels,
-        mosaic,
-        size=(max(SHAPE_WIDE * columns, 5.6), SHAPE_HIGH * rows + 0.6),
-    )
+    return mosaic, (max(wide * columns, 5.6), high * rows + room)
 
 
 def oblique_view(position: Mapping[str, Any]) -> Any:

@@ -232,7 +232,7 @@ def draw_graph(panel: Panel) -> str:
         f'<rect {size} fill="{panel.fill}"/>{inside}{"".join(_drawn(item, place) for item in behind)}</svg>',
         "".join(_axis(panel, place, across, up)),
         f"{inside}{''.join(_drawn(item, place) for item in before)}</svg>",
-        "".join(_entry(place, height, rows, *entry) for entry in entries),
+        "".join(_entry(height, rows, *entry) for entry in entries),
     ]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="still" viewBox="0 0 {width:g} {height:g}" role="img" '
@@ -446,7 +446,7 @@ def _legend(items: Sequence[Item], width: float) -> list[tuple[int, float, Item]
     return out
 
 
-def _entry(place: _Place, height: float, rows: int, row: int, x: float, item: Item) -> str:
+def _entry(height: float, rows: int, row: int, x: float, item: Item) -> str:
     y = height - 5.0 - (rows - 1 - row) * _ROW
     text = f'<text x="{x + 24:.1f}" y="{y:.1f}">{escape(getattr(item, "label", ""))}</text>'
     middle = y - 4.0

@@ -303,7 +303,7 @@ def _panels(result: Result, every: AllLines, shown: dict[str, Kept]) -> dict[str
     if every.outputs < 2:
         return found
     if every.alone is None:
-        found["histories"] = [largest_tensions(result, every)]
+        found["histories"] = [largest_tensions(every)]
     else:
         line = every.alone
         found["zones"] = [zone_map(line, next(iter(shown.values())))] if any(line.zones) else []

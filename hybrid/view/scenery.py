@@ -154,6 +154,18 @@ def _kinds(zones: list[Any], kinds: list[str], s: np.ndarray) -> np.ndarray:
 # ---- what is on the cable, and around it ----------------------------------------------------------
 
 
+def marked_on(line: Result, outputs: Any) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Places (outputs, n, 3) of what is attached to a line, and of its touchdown (nan at its ends); None: none."""
+    s, attached, touchdown = line.s, None, None
+    if "attached" in line and len(s) > 1:
+        where = np.clip(line["attached"], s[0], s[-1])  # output points may cover a part of the cable
+        attached = line.at(s=where, names=["position"])["position"][outputs]
+    if "touchdown_position" in line:
+        touchdown, edges = line["touchdown_position"][outputs].copy(), line["touchdown"][outputs]
+        touchdown[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
+    return attached, touchdown
+
+
 def _marks(result: Result, every: AllLines, store: Store, frames: np.ndarray) -> list[dict[str, Any]]:
     """Points that move: bodies, what is attached to a line alone, touchdown; then points, or the ends of that line.
 
@@ -169,17 +181,11 @@ def _marks(result: Result, every: AllLines, store: Store, frames: np.ndarray) ->
     if every.alone is None:
         places = np.stack([result[f"points/{n}/position"][frames] for n in points_of(result)], axis=1)
         return [*marks, mark("points", places, "circle", INK, 3), mark("", places[:, :0], "circle", INK, 1)]
-    line = every.alone
-    s, position = line.s, line.position[frames]
-    if "attached" in line and len(s) > 1:
-        where = np.clip(line["attached"], s[0], s[-1])  # output points may cover a part of the cable
-        places = line.at(s=where, names=["position"])["position"][frames]
-        marks.append(mark("float, clump, body", places, "circle", BODY, 10))
-    if "touchdown_position" in line:
-        places, edges = line["touchdown_position"][frames].copy(), line["touchdown"][frames]
-        places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
-        if np.isfinite(places).any():
-            marks.append(mark("touchdown", places, "diamond", TOUCHDOWN, 5))
+    position, (attached, touchdown) = every.alone.position[frames], marked_on(every.alone, frames)
+    if attached is not None:
+        marks.append(mark("float, clump, body", attached, "circle", BODY, 10))
+    if touchdown is not None and np.isfinite(touchdown).any():
+        marks.append(mark("touchdown", touchdown, "diamond", TOUCHDOWN, 5))
     ends = mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 4)
     return [*marks, *ends]  # the ends come last, over a body that they carry
 

@@ -41,7 +41,7 @@ from hybrid.view.figure import (
     short,
     write_file,
 )
-from hybrid.view.modes_page import oblique_view
+from hybrid.view.modes_page import grid_of, oblique_view
 from hybrid.view.report_parts import footer, packed, page_file, page_of, plotly_script, table_html
 
 if TYPE_CHECKING:
@@ -71,14 +71,10 @@ def _design_page(found: Any) -> Page:
     histories = getattr(found, "histories", ())
     for history in histories:
         panels[str(len(panels))] = _history(history, str(len(panels)))
-    columns = min(COLUMNS, len(panels))
-    rows = math.ceil(len(panels) / columns)
-    keys = [*panels, *["."] * (rows * columns - len(panels))]
-    mosaic = [keys[columns * row : columns * (row + 1)] for row in range(rows)]
+    mosaic, size = grid_of(panels, COLUMNS, WIDE, HIGH, 0.8)
     changes = [f"{name} {short(found.start[name], 4)} → {short(x, 4)}" for name, x in found.numbers.items()]
     more = f", and {len(changes) - NUMBERS} more" if len(changes) > NUMBERS else ""
     facts = ", ".join(changes[:NUMBERS]) + more
-    size = max(WIDE * columns, 5.6), HIGH * rows + 0.8
     named = [*panels][-1] if histories else "0"
     return Page(found.title or "(no title)", facts, 2, panels, mosaic, legend=(named,), size=size)
 

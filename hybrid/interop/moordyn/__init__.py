@@ -1,17 +1,6 @@
 """Input files of MoorDyn ("decks"), versions 1 and 2, as scenes: one of all lines, or one for each cable.
 
-    rows     text: sections, rows, cells, each with its line
-    types    line types, of both versions
-    deck     the tables of the deck: points, bodies, rods, lines, and do they hold together
-    options  its options, and those that hybrid has no use for
-    cables   which lines are one cable, and what is at its ends
-    tables   what all scenes have in common
-    scenes   the scene of a cable
-    systems  the scene of all lines of a deck
-    writer   the other way: a deck of what a result was computed from
-    notes    what could not be carried over as it stands
-
-docs/import.md lists what becomes of each part.
+docs/import.md lists what becomes of each part; `writer` goes the other way.
 """
 
 from __future__ import annotations
