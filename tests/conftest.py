@@ -16,6 +16,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.called import call  # noqa: F401
+
 PAGE = Path(__file__).parents[1] / "docs" / "evidence" / "validation.md"
 HEAD = """\
 # Validation

@@ -16,7 +16,7 @@ from hybrid.cli.app import FAILED, REFUSED, report_error
 from hybrid.cli.commands import main
 from hybrid.cli.console import Console
 from hybrid.cli.tables import lowest_node
-from tests.cli.conftest import Call
+from tests.called import Call
 
 WIRE = """\
 title: a wire that swings

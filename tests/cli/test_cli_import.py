@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import hybrid
-from tests.cli.conftest import Call
+from tests.called import Call
 
 DECKS = Path(__file__).parents[1] / "data" / "moordyn"
 

@@ -12,7 +12,7 @@ import pytest
 
 import hybrid
 from hybrid.view import animation as animate
-from tests.cli.conftest import Call
+from tests.called import Call
 
 # A wire of two sections, the second thicker: the larger radius holds at the seam.
 SCENE = """\

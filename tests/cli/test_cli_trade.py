@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Call
+from tests.called import Call
 
 SAG = """\
 title: a line that sags

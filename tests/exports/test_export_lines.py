@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.errors import ResultError
+from tests.called import Call
 from tests.scenes import line_between, network_scene
 
 ROPE = {"length": 60, "mass": 4, "diameter": 0.04, "axial_stiffness": 1e7}
@@ -38,14 +38,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def exported(
-    capsys: pytest.CaptureFixture[str], folder: Path, name: str, *arguments: str, result: str = "run.h5"
-) -> tuple[int, set[str], str]:
+def exported(call: Call, folder: Path, name: str, *arguments: str, result: str = "run.h5") -> tuple[int, set[str], str]:
     """Exit code, names of the files that were made, and what was said of an error."""
     before = {x.name for x in folder.iterdir()}
-    with pytest.raises(SystemExit) as left:
-        main(["export", str(folder / result), "-o", str(folder / name), *arguments])
-    return left.value.code or 0, {x.name for x in folder.iterdir()} - before, capsys.readouterr().err
+    said = call("export", str(folder / result), "-o", str(folder / name), *arguments)
+    return said.code, {x.name for x in folder.iterdir()} - before, said.err
 
 
 @pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
@@ -95,36 +92,36 @@ def test_a_file_opens_in_netcdf(folder: Path, file: str) -> None:
 
 
 @pytest.mark.needs("pandas")
-def test_points_and_bodies_are_exported_under_their_names(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_and_bodies_are_exported_under_their_names(folder: Path, call: Call) -> None:
     """As `hybrid.export` of the result does; a name of lines is a file of each, at the places that are asked for."""
     import pandas
 
-    assert exported(capsys, folder, "float.csv", "--names", "points/float/position") == (0, {"float.csv"}, "")
+    assert exported(call, folder, "float.csv", "--names", "points/float/position") == (0, {"float.csv"}, "")
     with hybrid.open(folder / "run.h5") as result:
         table = pandas.read_csv(folder / "float.csv", comment="#")
         assert np.array_equal(table.iloc[:, 1:], result["points/float/position"])
         hybrid.export(result, folder / "same.csv", names=["points/float/position"])
         assert (folder / "same.csv").read_bytes() == (folder / "float.csv").read_bytes()
-        made = exported(capsys, folder, "mix.csv", "--names", "tension,bodies/hull,points", "--at", "5")
+        made = exported(call, folder, "mix.csv", "--names", "tension,bodies/hull,points", "--at", "5")
         assert made == (0, {"mix.csv", "mix.west.csv", "mix.east.csv"}, "")
         table = pandas.read_csv(folder / "mix.csv", comment="#")
         for key in ("bodies/hull/position", "points/fairlead/velocity"):
             assert np.array_equal(table.filter(like=key), result[key])
         table = pandas.read_csv(folder / "mix.east.csv", comment="#")
         assert list(table.columns) == ["t (s)", "tension (N) at s = 5 m"]
-    assert exported(capsys, folder, "t.csv")[1] == {"t.west.csv", "t.east.csv"}, "tension, which lines alone have"
-    assert exported(capsys, folder, "e.csv", "--names", "events")[1] == {"e.csv", "e.west.csv", "e.east.csv"}
+    assert exported(call, folder, "t.csv")[1] == {"t.west.csv", "t.east.csv"}, "tension, which lines alone have"
+    assert exported(call, folder, "e.csv", "--names", "events")[1] == {"e.csv", "e.west.csv", "e.east.csv"}
 
 
 @pytest.mark.long
 @pytest.mark.needs("xarray", "h5netcdf")
-def test_netcdf_holds_everything(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_netcdf_holds_everything(folder: Path, call: Call) -> None:
     import xarray
 
-    assert exported(capsys, folder, "all.nc")[:2] == (0, {"all.nc", "all.west.nc", "all.east.nc"})
+    assert exported(call, folder, "all.nc")[:2] == (0, {"all.nc", "all.west.nc", "all.east.nc"})
     with xarray.open_dataset(folder / "all.nc") as shared, hybrid.open(folder / "run.h5") as result:
         assert np.array_equal(shared.points_float_position, result["points/float/position"])
-    assert exported(capsys, folder, "one.nc", "--line", "west")[1] == {"one.nc"}
+    assert exported(call, folder, "one.nc", "--line", "west")[1] == {"one.nc"}
 
 
 @pytest.mark.parametrize(
@@ -142,9 +139,9 @@ def test_netcdf_holds_everything(folder: Path, capsys: pytest.CaptureFixture[str
     ],
 )
 def test_what_is_not_there_is_refused(
-    folder: Path, capsys: pytest.CaptureFixture[str], name: str, arguments: tuple[str, ...], message: str
+    folder: Path, call: Call, name: str, arguments: tuple[str, ...], message: str
 ) -> None:
-    code, made, said = exported(capsys, folder, name, *arguments)
+    code, made, said = exported(call, folder, name, *arguments)
     assert code == 1 and message in said and not made
 
 
@@ -169,16 +166,16 @@ def test_the_only_line_is_what_a_format_of_one_line_is_of(folder: Path) -> None:
 
 
 @pytest.mark.needs("pythonfmu3")
-def test_a_scene_of_several_lines_becomes_a_unit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_of_several_lines_becomes_a_unit(folder: Path, call: Call) -> None:
     """The command makes of a file what `hybrid.export_fmu` makes of it; a wrong ending names the format."""
     (folder / "scene.yaml").write_text(json.dumps(SCENE))
-    assert exported(capsys, folder, "lines.fmu", result="scene.yaml") == (0, {"lines.fmu"}, "")
+    assert exported(call, folder, "lines.fmu", result="scene.yaml") == (0, {"lines.fmu"}, "")
     (folder / "python").mkdir()
     units = folder / "lines.fmu", hybrid.export_fmu(folder / "scene.yaml", folder / "python" / "lines.fmu")
     names = "resources/scene.yaml", "resources/interface.json"
     one, two = ([zipfile.ZipFile(unit).read(name) for name in names] for unit in units)
     assert one == two
-    assert "fmu of a scene" in exported(capsys, folder, "lines.xyz", result="scene.yaml")[2]
+    assert "fmu of a scene" in exported(call, folder, "lines.xyz", result="scene.yaml")[2]
 
 
 def test_a_result_says_what_it_is_of(folder: Path) -> None:
@@ -200,9 +197,8 @@ PAGE = ROOT / "docs" / "export.md"
 
 @pytest.mark.long
 @pytest.mark.needs("xarray", "h5netcdf", "netCDF4", "pandas", "vtk", "rainflow")
-def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_page_runs(tmp_path: Path, call: Call, capsys: pytest.CaptureFixture[str]) -> None:
     hybrid.run(hybrid.load_scene(ROOT / "examples" / "02_suspension.yaml"), tmp_path / "02_suspension.h5").close()
-    monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```(\w+)\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
     names: dict[str, object] = {}
     for language, block in blocks:
@@ -211,14 +207,13 @@ def test_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: 
                 words = shlex.split(line, comments=True)
                 assert words[0] == "hybrid" or line.startswith("pip install "), line
                 if words[0] == "hybrid":
-                    with pytest.raises(SystemExit) as left:
-                        main(words[1:])
-                    assert not left.value.code, f"{line}: {capsys.readouterr().err}"
+                    said = call(*words[1:])
+                    assert not said.code, f"{line}: {said.err}"
         elif language == "python":
             capsys.readouterr()
             exec(compile(block, PAGE.name, "exec"), names)
-            said = capsys.readouterr().out.splitlines()
-            assert said == re.findall(r"print\(.*\)  # (.*)$", block, re.MULTILINE), "as the comments beside it say"
+            printed = capsys.readouterr().out.splitlines()
+            assert printed == re.findall(r"print\(.*\)  # (.*)$", block, re.MULTILINE), "as the comments beside it say"
     assert {language for language, _ in blocks} >= {"bash", "python"}
     made = {file.name for file in tmp_path.iterdir()}
     assert {"02_suspension.nc", "02_suspension.csv", "02_suspension.vtkhdf", "02_suspension.cycles.csv"} <= made

@@ -8,6 +8,7 @@ import locale
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,12 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.errors import ResultError
 from hybrid.exports.api import SUFFIXES, export
 from hybrid.store.format import Field, Header
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
+from tests.called import Call
 from tests.scenes import cable_scene, pinned_at
 
 NS, LENGTH, PERIOD, PULL = 21, 10.0, 2.0, 20.0
@@ -473,15 +474,11 @@ def test_outputs_too_far_apart_are_said_and_how_much_they_lose(tmp_path: Path) -
 
 @pytest.mark.parametrize("kind", FORMATS)
 @pytest.mark.needs("xarray", "h5netcdf", "rainflow")
-def test_an_interrupted_result_says_so_everywhere(
-    tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupted_result_says_so_everywhere(tmp_path: Path, kind: str, call: Call) -> None:
     made(tmp_path / "run.h5", close=("interrupted", "stopped from outside")).close()
     file = tmp_path / f"run{SUFFIXES[kind]}"
-    with pytest.raises(SystemExit) as left:
-        main(["export", str(tmp_path / "run.h5"), "--format", kind])
-    said = capsys.readouterr()
-    assert not left.value.code and "; interrupted: stopped from outside -> " in said.out
+    said = call("export", str(tmp_path / "run.h5"), "--format", kind)
+    assert not said.code and "; interrupted: stopped from outside -> " in said.out
     text = "the run is not complete (interrupted: stopped from outside): t ends at 8 s"
     assert f"note: {text}" in " ".join(said.err.split())
     if kind in ("nc", "vtkhdf"):
@@ -491,12 +488,8 @@ def test_an_interrupted_result_says_so_everywhere(
         assert f"# note: {text}\n" in file.read_text(encoding="utf-8")
 
 
-def test_the_command_in_json_and_quietly(result: Result, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def call(*arguments: str) -> Any:
-        with pytest.raises(SystemExit) as left:
-            main(["export", str(tmp_path / "run.h5"), *arguments])
-        return left.value.code or 0, *capsys.readouterr()
-
+def test_the_command_in_json_and_quietly(result: Result, tmp_path: Path, call: Call) -> None:
+    call = partial(call, "export", str(tmp_path / "run.h5"))
     code, out, err = call("--format", "csv", "--times", "1:", "--at", "0,5", "--json")
     note, done = map(json.loads, out.splitlines())
     assert (code, err) == (0, "") and note["text"] == "only t = 1 to 8 s of 0 to 8 s"

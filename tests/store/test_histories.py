@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -12,7 +11,6 @@ import pytest
 from reported import reported
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.cli.statistics_commands import _fatigue_at, _fatigue_lines
 from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
@@ -20,6 +18,7 @@ from hybrid.statistics.fatigue import damage
 from hybrid.store import statistics_table
 from hybrid.store.histories import bends_of, extreme_of, history_of
 from hybrid.store.statistics_table import rows_of, values_of
+from tests.called import Call
 from tests.scenes import cable_scene, pinned_at
 
 SCENE = cable_scene(
@@ -201,45 +200,28 @@ def wide(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.needs("rainflow")
-def test_the_command_prints_rows(result: hybrid.Result, wide: None, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_rows(result: hybrid.Result, wide: None, call: Call) -> None:
     """Every figure of the table is in the JSON; a run that is too short for extremes says so once."""
-    with pytest.raises(SystemExit) as ended:
-        main(
-            [
-                "stats",
-                str(result.file),
-                "--json",
-                "--times",
-                "30:",
-                "--curve",
-                "studless chain T-N",
-                "--strength",
-                "1e6",
-            ]
-        )
-    assert not ended.value.code
-    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    asked = ["--times", "30:", "--curve", "studless chain T-N", "--strength", "1e6"]
+    said = call("stats", str(result.file), "--json", *asked)
+    assert not said.code
+    rows = said.lines
     tension = next(row for row in rows if row.get("quantity") == "tension")
     column = np.flatnonzero(result.s == tension["s"])[0]
     assert tension["maximum"] == result.tension[result.t >= 30.0, column].max()
     assert rows[-1]["fatigue"]["damage"] > 0.0
-    with pytest.raises(SystemExit):
-        main(["stats", str(result.file), "--times", "100:"])
-    shown = capsys.readouterr()
+    shown = call("stats", str(result.file), "--times", "100:")
     assert "tension (N)" in shown.out and "no MPM in 3 h of" in shown.err
     head = " ".join(shown.out.splitlines()[0].split()), " ".join(shown.out.splitlines()[1].split())
     assert head == ("standard MPM P90", "s (m) mean deviation skewness smallest largest period (s) in 3 h in 3 h")
 
 
 @pytest.mark.needs("rainflow")
-def test_damage_and_fatigue_life_at_chosen_places(
-    result: hybrid.Result, wide: None, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_damage_and_fatigue_life_at_chosen_places(result: hybrid.Result, wide: None, call: Call) -> None:
     asked = ["--names", "tension", "--at", "12,48", "--curve", "studless chain T-N", "--strength", "1e6"]
-    with pytest.raises(SystemExit) as ended:
-        main(["stats", str(result.file), "--below", "100", *asked])
-    assert not ended.value.code
-    lines = capsys.readouterr().out.splitlines()
+    said = call("stats", str(result.file), "--below", "100", *asked)
+    assert not said.code
+    lines = said.out.splitlines()
     damage = result.damage("studless chain T-N", strength=1e6, at=[12.0, 48.0])[1]
     part = 100.0 * result.exceedance("tension", below=100.0, at=[12.0, 48.0])
     for s, d, p in zip((12, 48), damage, part, strict=True):
@@ -347,7 +329,7 @@ def test_components_of_vectors_have_rows_of_their_own_at_places() -> None:
         result.extreme("position", at=50.0)
 
 
-def test_an_equilibrium_has_values_at_places(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_equilibrium_has_values_at_places(tmp_path: Any, call: Call) -> None:
     """A place between two output points too; the command says that they are no statistics."""
     tables = {key: value for key, value in SCENE.items() if key != "time"}
     result = hybrid.static(hybrid.validate_scene(tables), tmp_path / "rest.h5")
@@ -359,10 +341,8 @@ def test_an_equilibrium_has_values_at_places(tmp_path: Any, capsys: pytest.Captu
     assert found == {"curvature": pytest.approx(wanted["curvature"]), "z": pytest.approx(wanted["position"][2])}
     (largest,) = values_of(result, ["tension"])
     assert largest["value"] == result["tension"].max()
-    with pytest.raises(SystemExit) as left:
-        main(["stats", str(tmp_path / "rest.h5"), "--names", "curvature", "--at", "12.3"])
-    told = capsys.readouterr()
-    assert not left.value.code and f"{wanted['curvature']:.5g}" in told.out and "equilibrium" in told.out + told.err
+    told = call("stats", "rest.h5", "--names", "curvature", "--at", "12.3")
+    assert not told.code and f"{wanted['curvature']:.5g}" in told.out and "equilibrium" in told.out + told.err
 
 
 # A fatigue life with the errors of what it rests on: ranges that are off by a part change it by that to the slope.

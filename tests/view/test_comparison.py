@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from reported import reported
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.errors import ResultError
 from hybrid.view.comparison import COLOURS, _differences, _ranges, _table
 from hybrid.view.figure import short
@@ -28,12 +27,7 @@ initial: equilibrium
 model: catenary
 mesh: {{cells: 16}}
 """
-
-
-def command(*arguments: str) -> int | str | None:
-    with pytest.raises(SystemExit) as left:
-        main([*arguments, "--quiet"])
-    return left.value.code
+from tests.called import Call
 
 
 def test_differences_are_those_at_the_same_instant_and_place() -> None:
@@ -89,20 +83,19 @@ def test_the_table_has_differences_in_percent() -> None:
     assert cells[0] == "9 kN" and cells[1] == "3 kN (-66.7 %)"
 
 
-def test_a_page_of_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_of_two_files(tmp_path: Path, call: Call) -> None:
     for name, x in (("near", 35), ("far", 40)):
         (tmp_path / f"{name}.yaml").write_text(SCENE.format(title=name, x=x))
-        assert not command("static", str(tmp_path / f"{name}.yaml"), "-o", str(tmp_path / f"{name}.h5"))
+        assert not call("static", str(tmp_path / f"{name}.yaml"), "-o", str(tmp_path / f"{name}.h5"), "-q").code
     files = [str(tmp_path / "near.h5"), str(tmp_path / "far.h5")]
-    assert not command("report", *files)
+    assert not call("report", *files, "-q").code
     page = (tmp_path / "near_far.html").read_text()
     assert "near, far: compared" in page and "What far has another way than near" in page
     assert "+    position: [40.0, 0.0, 0.0]" in page and "largest tension" in page
     figures = json.loads(re.search(r'id="index">(.*?)</script>', page, re.S)[1])["figures"]  # type: ignore[index]
     assert [trace["name"] for trace in figures[0]["data"]] == ["near", "far"]
-    capsys.readouterr()
-    assert command("report", files[0], files[0]) == 1  # refused before anything is done
-    assert "compared with itself" in capsys.readouterr().err
+    said = call("report", files[0], files[0], "-q")
+    assert said.code == 1 and "compared with itself" in said.err  # refused before anything is done
 
 
 def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
@@ -181,13 +174,9 @@ def test_numbers_have_no_exponents() -> None:
     assert short(12345.0, 4) == "12340" and short(0.00012, 2) == "0.00012" and short(3.0, 4) == "3"
 
 
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_the_command(call: Call) -> None:
     for arguments in (["static", str(EXAMPLE), "-o", "a.h5"], ["plot", "a.h5", "--quantity", "tension", "--envelope"]):
-        with pytest.raises(SystemExit) as left:
-            main([*arguments, "--quiet"])
-        assert not left.value.code
+        assert not call(*arguments, "--quiet").code
     assert Path("a.tension.png").stat().st_size > 1000
-    with pytest.raises(SystemExit) as left:
-        main(["plot", "a.h5", "--quantity", "tensoin"])
-    assert left.value.code == 1 and "tensoin" in capsys.readouterr().err
+    said = call("plot", "a.h5", "--quantity", "tensoin")
+    assert said.code == 1 and "tensoin" in said.err

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import pytest
 
-from hybrid.cli.commands import main
-
 
 class Said(NamedTuple):
     """How a command ended, and what it said on which stream."""
@@ -34,6 +32,8 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str) -> Said:
+        from hybrid.cli.commands import main
+
         capsys.readouterr()
         with pytest.raises(SystemExit) as leaving:
             main(list(arguments))
