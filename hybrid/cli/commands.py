@@ -251,9 +251,7 @@ def import_(
 
 
 @app.command()
-def schema(
-    lines: Annotated[bool, flag("--lines", help="Of scenes with points and lines alone.")] = False,
-) -> None:
+def schema(lines: Annotated[bool, flag("--lines", help="Of scenes with points and lines alone.")] = False) -> None:
     """Print the JSON schema of a scene, for editors."""
     from hybrid.scene.network import Network
     from hybrid.scene.root import Scene

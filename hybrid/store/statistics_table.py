@@ -13,15 +13,7 @@ from hybrid.statistics.moments import exceedance, summary
 from hybrid.store.capacity import CODE_NAME as CODE_USED
 from hybrid.store.capacity import NAME as CAPACITY_USED
 from hybrid.store.envelope import extreme
-from hybrid.store.histories import (
-    Window,
-    components_of,
-    extreme_of,
-    history_of,
-    lies_along,
-    summary_of,
-    usual_names,
-)
+from hybrid.store.histories import Window, components_of, extreme_of, history_of, lies_along, summary_of, usual_names
 from hybrid.store.limits import at_every_step, capacity_of, code_of
 from hybrid.store.reader import Result
 

@@ -483,14 +483,7 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
         note = f"{note or 'Warning'}{';' if note else ':'} {broken[0].text}{broken[0].when}{more_of}"
     texts, alarm = "; ".join(filter(None, [*head, *facts])), (not result.done, bool(alarms or broken))
     empty = "" if n else "no output was saved"
-    return Page(
-        result.title or "(no title)",
-        texts,
-        note=note,
-        alarm=alarm,
-        empty=empty,
-        **more,
-    )
+    return Page(result.title or "(no title)", texts, note=note, alarm=alarm, empty=empty, **more)
 
 
 def only_line(result: Result, what: str) -> Result:

@@ -271,9 +271,7 @@ def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: boo
         more |= {"widths": [1.0, 0.022], "legend": ["map"]}
         more["heights"] = [*(3.0 / len(rows) for _ in rows), 0.8]
     return save_figure(
-        draw_page(page_of(result, [x for x in (counted(line), why_rods(line)) if x], **more)),
-        path,
-        overwrite=overwrite,
+        draw_page(page_of(result, [x for x in (counted(line), why_rods(line)) if x], **more)), path, overwrite=overwrite
     )
 
 

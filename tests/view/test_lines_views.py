@@ -26,16 +26,7 @@ from hybrid.scene.root import in_full
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks, Text
-from hybrid.view.lines import (
-    AllLines,
-    arms_of,
-    clearest_view,
-    motions,
-    page,
-    points_of,
-    rotations,
-    views_of_lines,
-)
+from hybrid.view.lines import AllLines, arms_of, clearest_view, motions, page, points_of, rotations, views_of_lines
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import _extreme_text, html
 from tests.scenes import network_scene

@@ -116,11 +116,7 @@ class Tables:
 
     def _section(self, line: Line, kind: LineType, length: float, strain: float) -> str:
         """A section in one line of YAML; strain: that its ends ask for, 0: none."""
-        section: dict[str, Any] = {
-            "length": length,
-            "mass": kind.mass,
-            "diameter": kind.diameter,
-        }
+        section: dict[str, Any] = {"length": length, "mass": kind.mass, "diameter": kind.diameter}
         how = kind.stretch
         dynamic = how.dynamic
         if how.polyester is not None:
