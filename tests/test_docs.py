@@ -303,7 +303,7 @@ def test_the_tutorial_shows_what_its_commands_print(tmp_path: Path) -> None:
 MARK = re.compile(r"^<!-- not run in CI: *(.*?) *-->\n\Z", re.MULTILINE)
 # Pinned, so that nobody marks a block in passing: page, blocks that are not run.
 MARKED = {"index.md": 1, "studies.md": 1, "trade.md": 1}
-# extend.md is tests/test_extend.py, export.md tests/exports/test_export_page.py; of the README .ci/run runs the first two blocks, and test_docs.py the others, commands.md and tutorial.md.
+# extend.md is tests/test_extend.py, export.md tests/exports/test_export_lines.py; of the README .ci/run runs the first two blocks, and test_docs.py the others, commands.md and tutorial.md.
 ELSEWHERE = {"extend.md", "export.md", "README.md", "tutorial.md", "commands.md"}
 # Files that run examples as they stand and check their figures: examples.md does not run those again.
 FIGURES = ("test_examples.py", "test_examples.py", "simulation/test_stepping.py", "couple/test_fmu.py")
