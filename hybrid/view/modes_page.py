@@ -72,8 +72,8 @@ def _page(found: Any) -> Page:
         panels[str(k)] = Panel(str(k), title, Axis("", "m", *span[0]), Axis("", "m", *span[1]), items, aspect=1.0)
     if not panels:
         return Page(found.title or "(no title)", "", empty="no mode")
-    mosaic, size = grid_of(panels, COLUMNS, SHAPE_WIDE, SHAPE_HIGH, 0.6)
-    return Page(found.title or "(no title)", FACTS, 1, panels, mosaic, size=size)
+    mosaic, inches = grid_of(panels, COLUMNS, SHAPE_WIDE, SHAPE_HIGH, 0.6)
+    return Page(found.title or "(no title)", FACTS, 1, panels, mosaic, size=inches)
 
 
 def grid_of(
