@@ -236,7 +236,7 @@ class StoredResult:
         head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
         return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
 
-    def at(
+    def values_at(
         self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None, side: str | None = None
     ) -> dict[str, Any]:
         """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
@@ -260,6 +260,8 @@ class StoredResult:
                 along = t is not None and "t" in dims
                 answer[key] = _interpolate(array, dims.index("t"), self["t"], t, "t", "s") if along else array
         return answer
+
+    at = values_at
 
     def _at_places(self, name: str, axis: int, s: Any, side: str | None) -> dict[str, np.ndarray]:
         """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""
