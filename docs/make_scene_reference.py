@@ -512,7 +512,9 @@ def former_names() -> Iterator[str]:
     yield ""
     yield "| table | former name | name of today |"
     yield "|---|---|---|"
-    tables = [kind for base in Table.__subclasses__() for kind in (base, *base.__subclasses__())]
+    tables = [Table]
+    for table in tables:
+        tables += table.__subclasses__()
     for table in sorted(tables, key=lambda kind: kind.__name__):
         for old, new in table.former.items():
             yield f"| [{table.__name__}](#{table.__name__.lower()}) | `{old}` | `{new}` |"

@@ -1,7 +1,7 @@
 """The seabed: where it is under a point, and its contact and friction.
 
 It is a plane, or a surface through depths on a grid.  A bed of depths is the bicubic Hermite surface through the
-heights at the grid's points.  The slopes there are limited (scene.depths): height and slope are continuous, a plane
+heights at the grid's points.  The slopes there are limited (scene.sea): height and slope are continuous, a plane
 comes out as a plane, and between four points no height is above or below all of theirs.  Beyond the grid the bed goes
 on straight.
 

@@ -10,7 +10,7 @@ The nearest place of a surface of triangles, by a tree of boxes over them, and w
     h, a     curvature 1/d across a, the direction of an edge; 0 of a face        -, 3   1/m
 
 Within is what the normal of the nearest feature says, on edges and corners weighted by the angles of the facets that
-meet there (Baerentzen and Aanaes 2005): closed surfaces, turned outwards (scene.mesh_file).
+meet there (Baerentzen and Aanaes 2005): closed surfaces, turned outwards (scene.obstacles).
 
 All kinds by one function: distance, outward normal and curvature at a point.
 

@@ -1,7 +1,7 @@
 """What the motion of lines answers to numbers of its scene: tangents along the steps of a run.
 
 As of one line (kernels.watch.tangents), line by line; what lines hand over to points and bodies is solved with the
-factors of the lines that the last iteration has left, as another right-hand side (kernels.junctions.right_sides).
+factors of the lines that the last iteration has left, as another right-hand side (kernels.junctions.borders).
 
 A body has tangents of its own: of its place r, of its turn theta (inertial), of the rotation vector n of the step, and
 of the rates of both.  With R' = R_0 exp([n]x),  theta' = theta_0' + R_0 J(n) n',  J the left Jacobian.
