@@ -103,7 +103,8 @@ class Table(BaseModel):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        known = {name: x for base in reversed(cls.__mro__) for name, x in vars(base).items()}
+        tables = (base for base in reversed(cls.__mro__) if issubclass(base, Table))
+        known = {name: x for base in tables for name, x in vars(base).items()}
         cls.checks = tuple(x for name, x in known.items() if name.startswith("_check"))
         if cls.bases_last:
             order = dict.fromkeys(name for base in cls.__mro__ for name in inspect.get_annotations(base))

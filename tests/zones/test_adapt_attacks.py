@@ -10,7 +10,7 @@ from adapt_scenes import changes, rods
 from problems import clamped, free, pinned
 
 import hybrid
-from tests.scenes import cable_scene
+from tests.scenes import cable_scene, pinned_at
 
 Text = dict[str, Any]
 
@@ -165,6 +165,38 @@ def test_a_step_that_fails_gets_all_of_the_stiffness_back():
 # --- ends that leave the spin free, and torque where zones change ---
 
 
+def hanging(random: np.random.Generator) -> dict[str, Any]:
+    """A cable that hangs from a moving pin in a current that turns with depth; SI units."""
+    length, mass = random.uniform(15.0, 60.0), random.uniform(0.3, 2.0)
+    width = np.sqrt(4.0 * random.uniform(0.2, 0.7) * mass / (1025.0 * np.pi))
+    period = random.uniform(5.0, 14.0)
+    top = random.uniform(-0.25, 0.25, size=2)
+    duration = 1.7 * period
+    section = {
+        "length": length, "mass": mass, "diameter": float(width), "axial_stiffness": 3e5,
+        "bending_stiffness": float(np.exp(random.uniform(np.log(0.5), np.log(50.0)))),
+        "drag": {"normal": 1.1, "tangential": 0.02}, "added_mass": {"normal": 1.0},
+        "damping": {"mass": 0.05, "stiffness": 3e-4},
+    }  # fmt: skip
+    profile = [{"z": 0.0, "velocity": [*top, 0.0]}, {"z": -length, "velocity": [*(0.3 * top[::-1]), 0.0]}]
+    surge = {"amplitude": random.uniform(0.1, 0.6), "period": period, "phase": random.uniform(0.0, 360.0)}
+    return cable_scene(
+        section, pinned_at(0.0, 0.0, 0.0, motion={"ramp": 1.8 * period, "surge": surge}), {"kind": "free"},
+        fluid={"density": 1025, "current": profile}, mesh={"cells": 80, "ratio": 0.1},
+        time=(duration, duration / 200.0), output=(duration / 20.0, 41)
+    )  # fmt: skip
+
+
+@pytest.mark.long  # 1.8 s
+def test_forty_one_lines_with_free_ends_take_no_more_steps_than_asked() -> None:
+    random = np.random.default_rng(41)
+    for number in range(41):
+        scene = hanging(random)
+        result = hybrid.run(hybrid.validate_scene(scene | {"model": "adaptive"}))
+        assert len(result["steps/t"]) <= 201 and not result["steps/repeats"][:].any(), f"line {number}"
+        assert any(zone.kind == "rod" for zones in result.zones for zone in zones), f"line {number}"
+
+
 def defect(force: float, length: float, time: float) -> dict[str, Any]:
     """The line that went through half a turn at once where its bend went through zero, in other units.
 
@@ -238,3 +270,19 @@ def test_torque_of_zones_that_move(tmp_path, turns, swing):
     assert len(mixed.events) >= 2
     assert "torque neglected" not in {event.kind for event in mixed.events}
     np.testing.assert_allclose(mixed["torque"][:].mean(axis=1), torque, atol=1e-3 * np.abs(torque).max())
+
+
+@pytest.mark.slow
+def test_no_turn_is_lost_in_sixty_motions(tmp_path):
+    """Turns and swings at random: what the clamp turns by is the link of the line, in rods, zones and between them."""
+    adaptive, random = {"kind": "adaptive", "tolerance": 0.004, "hold_time": 0.5}, np.random.default_rng(60)
+    changes = 0
+    for _ in range(60):
+        turns, swing = random.uniform(-3.0, 3.0), random.uniform(0.0, 5.0)
+        result = line(tmp_path, turns, adaptive, swing)
+        kinds = {event.kind for event in result.events}
+        changes += len(kinds & {"split", "grow", "merge", "shrink"}) > 0
+        lost = turns - result["turns/link"][result.times > 7.5]  # two at a time where it passes through itself
+        through = 2.0 * np.round(0.5 * lost) if "line meets itself" in kinds else 0.0
+        np.testing.assert_allclose(lost, through, atol=1e-6, err_msg=f"{turns} turns, swing {swing} m")
+    assert changes >= 50

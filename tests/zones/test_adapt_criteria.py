@@ -61,6 +61,20 @@ def test_straight_and_taut_asks_for_nothing_but_its_tension():
     assert np.abs(np.delete(ratios, SLACK, axis=0)).max() < 1e-12
 
 
+def test_bend_of_an_arc():
+    """On a circle of 5 m: EI/(R T tolerance), but for the turn between two chords, which is h/R and not 2 sin(h/2R)."""
+    R, n = 5.0, 50
+    zones = even(n, "C" * n)
+    line = on(cable(), zones)
+    state = state_on(line, lambda s: R * np.column_stack([np.sin(s / R), 0 * s, 1 - np.cos(s / R)]), 50.0)
+    h = 10.0 / n
+    exact = EI / (R * 50.0 * TOL)
+    assert weighed(cable(), zones, state, tolerance=TOL)[BEND] == pytest.approx(
+        exact * 2 * np.sin(h / (2 * R)) / (h / R), rel=ROUND
+    )
+    assert exact * (h / R) ** 2 / 24 < 1e-4 * exact  # what is between that and the smooth arc
+
+
 @pytest.mark.parametrize("flags", ["CCCCCCCC", "CCRRRCCC", "RRRRRRRR"])
 def test_bend_node_by_node(flags):
     """Any turns, any tensions, uneven cells: the sharpest and the smaller tension count; a base cell sees both its ends."""

@@ -20,7 +20,7 @@ from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
 from hybrid.scene.schema import LineScene
 from hybrid.simulation import run_zones, zones_at_rest
-from hybrid.solve.network_steps import Tried
+from hybrid.solve.stepper import NetworkTaken
 from hybrid.zones.at_start import manager_for, rods_at_winch
 from hybrid.zones.change import ZoneSwitching, on_layout
 from hybrid.zones.criteria import shares_asked
@@ -185,7 +185,7 @@ def rescued(outcome: Outcome, rescues: int, slack: int = -1) -> list[int]:
     if slack >= 0:
         tried.T[slack] = model.slack_floor
     switching = ZoneSwitching(model, found)
-    change = switching.rescue(Tried(outcome, 5, 1.0, 11), 1.0, tried, rescues)
+    change = switching.rescue(NetworkTaken(outcome, 5, 1.0, 0, 11, 0.0), 1.0, tried, rescues)
     return [] if change is None else np.flatnonzero(change.rod).tolist()
 
 
