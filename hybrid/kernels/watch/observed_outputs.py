@@ -605,7 +605,7 @@ class Found(NamedTuple):
     def layers(self, points: Floats) -> Floats:
         """As of `observe_layers` at points (nb, ns) m."""
         less = np.zeros((*points.shape, 3))
-        observe_layers(self.tables, np.array(points), less)  # what is read only has another type
+        observe_layers(self.tables, np.array(points, order="C"), less)  # of one type: read-only arrays have another
         return less
 
 
