@@ -32,7 +32,13 @@ WEIGHTS = 3
 # Sizes below which a quantity is held against these, not against its own: what Newton's method leaves of a velocity near
 # rest is round-off of forces, 1e-14 m/s, and of another compilation another one.
 # What a line that is not twisted has of torque is round-off of its bending moment.
-SMALLEST = {"velocity": 0.05, "energy": 1e-9, "work": 100.0, "torque": 0.1, "twist": 1e-4}  # m/s or rad/s, J, J, N m, 1/m
+SMALLEST = {
+    "velocity": 0.05,
+    "energy": 1e-9,
+    "work": 100.0,
+    "torque": 0.1,
+    "twist": 1e-4,
+}  # m/s or rad/s, J, J, N m, 1/m
 # Clocks, and numbers that go by them.
 CLOCKS = ("steps/cpu",)
 Digest = dict[str, list[float]]
