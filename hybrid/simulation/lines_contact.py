@@ -379,16 +379,13 @@ def jumps(a: Floats, b: Floats) -> float:
 
 def crossed(touching: Touching, first: NetworkState, last: NetworkState) -> Iterator[tuple[int, int]]:
     """Numbers of lines, two each, of which one passes through the other on the straight way between two shapes."""
+    ways = [np.stack(_of_as_many_nodes(first.lines[k].r, last.lines[k].r)) for k in touching.lines]
+    lows, highs = (np.array([f(w, axis=(0, 1)) for w in ways]) for f in (np.min, np.max))
     for j, a in enumerate(touching.lines):
-        for k, b in enumerate(touching.lines[j + 1 :], j + 1):
-            if not touching.meets[j, k]:
-                continue
-            ways = [np.stack(_of_as_many_nodes(first.lines[m].r, last.lines[m].r)) for m in (a, b)]
-            lows, highs = ([f(w, axis=(0, 1)) for w in ways] for f in (np.min, np.max))
-            if (np.maximum(*lows) > np.minimum(*highs)).any():
-                continue
-            if jumps(*ways) > JUMP:
-                yield a, b
+        beside = touching.meets[j] & ((lows[j] <= highs) & (lows <= highs[j])).all(axis=1)
+        for k in np.flatnonzero(beside[j + 1 :]) + j + 1:
+            if jumps(ways[j], ways[k]) > JUMP:
+                yield a, touching.lines[k]
 
 
 def _of_as_many_nodes(a: Floats, b: Floats) -> list[Floats]:

@@ -132,8 +132,9 @@ class Run(RecordedRun):
             solver.evaluate_forces(self.state, solver.anchor)  # what nothing holds has no report without its springs
             for part in self.parts:
                 part.at_rest()
+            turned = self.turned
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
-                line.note_equilibrium(x, state, None, self.found, self.turned)
+                line.note_equilibrium(x, state, None, self.found, turned)
             self.renew_other()
             self.loop.attach(solver, self.state, self.other)
             self._output()
@@ -200,9 +201,10 @@ class Run(RecordedRun):
             text = "waves act on lines and points, not on the body, which has no members"
             for body in (x for x in self.model.bodies if x.members is None):
                 self.note("waves on body neglected", f"body {body.name}: {text}")
+        turned = self.turned
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
             if self.found is not None:
-                line.note_equilibrium(x, state, 0.0, self.found, self.turned)
+                line.note_equilibrium(x, state, 0.0, self.found, turned)
             else:
                 line.note_start(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)

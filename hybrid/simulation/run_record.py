@@ -20,7 +20,6 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.junctions.bodies import SPRING
-from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE, Floats
@@ -177,10 +176,7 @@ class RunFile:
         assert run.target is not None
         if self._asks.source is not None:
             mode = mode._replace(late=True)  # until its rows are copied
-        recorder = Recorder(
-            run.target, header, outputs=len(run.times) + 1, overwrite=True, mode=mode,
-            templates=cache_folder().parent, parts=parts,
-        )  # fmt: skip
+        recorder = Recorder(run.target, header, outputs=len(run.times) + 1, overwrite=True, mode=mode, parts=parts)
         recorder.files = run.files
         return recorder
 

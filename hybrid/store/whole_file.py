@@ -1,8 +1,7 @@
 """The file of a result, made in one go of what is in memory: of a short run when it has ended, of others as they begin.
 
-HDF5 takes 10 ms to make the 70 datasets of a line with their units and dimensions, and 1 ms to open a file that has
-them.  So a file begins as a template: the bytes of one with all datasets and no values, which are kept.  Files of many
-lines are made without one.
+HDF5 takes 20 ms to make the 100 datasets of a line with their units and dimensions, and 3 ms to open them.  So a file
+of few lines begins as a template: the bytes of one with all datasets and no values, which the process keeps.
 
 A file that readers may open while it grows is flushed before and after every change of its lengths, and what is known
 of a result afterwards goes into a copy.  A run that takes less than the time for which outputs are held back anyhow
@@ -11,11 +10,9 @@ needs neither: its result waits in memory (`LateFile`), is added to until all is
 
 from __future__ import annotations
 
-import hashlib
 import os
 import zlib
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Hashable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from time import monotonic
@@ -29,7 +26,6 @@ from h5py import h5a, h5d, h5ds, h5o, h5p, h5s, h5t
 from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
 from hybrid.store.format import (
     BLOCK,
-    FORMAT_VERSION,
     SCALAR,
     STATUS_WIDTHS,
     ArrayContents,
@@ -38,7 +34,6 @@ from hybrid.store.format import (
     chunk_rows,
     fixed_text,
     made,
-    versions,
     write_texts,
 )
 from hybrid.store.hdf5_file import GROUP, TOGETHER, image_of, in_memory, replacing
@@ -49,19 +44,9 @@ WAITS = 0.2  # s, that it waits at most while errors of the result are estimated
 # Bytes of all results in memory whose files are written; of those after them the arrays are read when they are needed.
 MOST_STAYING = 256_000_000
 _staying: WeakSet[ArrayContents] = WeakSet()
-# Lines in a file whose template is kept, of 80 kB each.
-MOST_KEPT = 8
-
-
-class Layout(NamedTuple):
-    """How a file is laid out, beside what is in it.
-
-    outputs: their number if it is known, which only makes small files smaller; templates: folder where templates of
-    files are kept, None: in this process alone.
-    """
-
-    outputs: int | None = None
-    templates: Path | None = None
+# Lines in a file that begins as a template, and templates that are kept, of 80 kB a line.
+MOST_LINES, MOST_KEPT = 8, 64
+_kept: dict[Hashable, bytes] = {}
 
 
 class Restart(NamedTuple):
@@ -77,10 +62,10 @@ class Restart(NamedTuple):
 class LateFile:
     """A result in memory, to be added to until it is written to its place."""
 
-    def __init__(self, path: Path, contents: ArrayContents, restart: Restart | None, layout: Layout) -> None:
+    def __init__(self, path: Path, contents: ArrayContents, restart: Restart | None, outputs: int | None) -> None:
         """path: its place; the others: as of `new_file`."""
         self.path, self.contents, self.placed = path, contents, False
-        self._restart, self._layout = restart, layout
+        self._restart, self._outputs = restart, outputs
         self._made = monotonic()  # s
 
     def leave(self, before: Tree) -> None:
@@ -107,7 +92,7 @@ class LateFile:
             return
         self.placed = True
         with replacing(self.path, by_hdf5=True) as new:
-            image = image_of(new_file(self.contents, self._restart, self._layout))
+            image = image_of(new_file(self.contents, self._restart, self._outputs))
             with new.open("wb") as file:
                 file.write(image)
                 file.write(tail_of(len(image), zlib.crc32(image)))
@@ -139,15 +124,22 @@ def groups_of(contents: ArrayContents) -> Iterator[tuple[str, ArrayContents]]:
         yield f"{GROUP}/{name}/", part
 
 
-def new_file(contents: ArrayContents, restart: Restart | None, layout: Layout) -> h5py.File:
-    """A file in memory of a result, with the rows that it has; restart: None: nobody can go on with it."""
-    begin, bare, few = b"", Bare(layout.outputs), len(contents.parts) < MOST_KEPT
-    if few:
-        shape = tuple((group, _shape_of(part)) for group, part in groups_of(contents))
-        whole = ("whole", shape, layout.outputs, restart is not None)
-        begin = kept(whole, lambda: _template(contents, restart is not None, layout), layout.templates)
-    file = in_memory(begin)
-    for k, (group, part) in enumerate(groups_of(contents), 1):
+def new_file(contents: ArrayContents, restart: Restart | None, outputs: int | None) -> h5py.File:
+    """A file in memory of a result, with the rows that it has.
+
+    restart: None: nobody can go on with it; outputs: their number if it is known, which only makes small files smaller.
+    """
+    few, groups = len(contents.parts) < MOST_LINES, [*groups_of(contents)]
+    shape = (*((group, _shape_of(part)) for group, part in groups), outputs, restart is not None) if few else None
+    file, bare = in_memory(_kept.get(shape, b"")), Bare(outputs)
+    if shape not in _kept:
+        if restart is not None:
+            create_slots(file)
+        if few:
+            for group, part in groups:
+                bare.create(file, group, part)
+            _keep(shape, file)
+    for k, (group, part) in enumerate(groups, 1):
         _fill(file, group, part, {} if few else bare.create(file, group, part))
         if k % TOGETHER == 0:
             file.flush()
@@ -155,8 +147,6 @@ def new_file(contents: ArrayContents, restart: Restart | None, layout: Layout) -
     if contents.parts:
         file[GROUP].attrs["order"] = list(contents.parts)
     if restart is not None:
-        if not few:
-            create_slots(file)
         slots = [file[name] for name in SLOTS] if restart.checkpoints else []
         for number, data in restart.checkpoints.items():
             write_slot(slots, number, data)
@@ -170,14 +160,12 @@ def _shape_of(part: ArrayContents) -> Hashable:
     return tuple(of_rows), tuple(part.groups)
 
 
-def _template(contents: ArrayContents, resumable: bool, layout: Layout) -> bytes:
-    file, bare = in_memory(), Bare(layout.outputs)
-    for group, part in groups_of(contents):
-        bare.create(file, group, part)
-    bare.close()
-    if resumable:
-        create_slots(file)
-    return image_of(file)
+def _keep(shape: Hashable, file: h5py.File) -> None:
+    """Keep the bytes of a file that has no values yet."""
+    if len(_kept) >= MOST_KEPT:
+        _kept.clear()
+    file.flush()
+    _kept[shape] = bytes(file.id.get_file_image())
 
 
 class Bare:
@@ -187,7 +175,7 @@ class Bare:
     """
 
     def __init__(self, outputs: int | None) -> None:
-        """outputs: as of `Layout`."""
+        """outputs: as of `new_file`."""
         self._outputs, self._made = outputs, dict[Hashable, h5py.File]()
 
     def create(self, file: h5py.File, group: str, part: ArrayContents) -> dict[str, h5d.DatasetID]:
@@ -277,58 +265,3 @@ def write_attributes(root: h5py.Group, attributes: Mapping[str, Any]) -> None:
         else:
             array = np.array(value, text if isinstance(value, str) else None)
         h5a.create(root.id, name.encode(), h5t.py_create(array.dtype, logical=True), SCALAR).write(array)
-
-
-# Templates of result files: a file with all its datasets and no values, which a new result begins as.
-#
-# The bytes of a new file are kept, in this process and in a folder, under a key made of all that shapes them.  One that
-# is missing, cut off or spoilt is made anew; one that cannot be kept is made every time.
-
-_KEPT = 64  # files of 80 kB a line; the oldest are deleted
-_DIGEST = 32  # bytes before the template, of the template
-_SUFFIX = ".template"
-_known: dict[tuple[Hashable, ...], bytes] = {}
-
-
-def kept(shape: tuple[Hashable, ...], make: Callable[[], bytes], folder: Path | None) -> bytes:
-    """What is made of all that shapes it, from this process, from the folder, or made anew."""
-    if shape not in _known:
-        key = hashlib.sha256(f"{shape} {_makers()}".encode()).hexdigest()[:32]
-        if len(_known) >= _KEPT:
-            _known.clear()
-        _known[shape] = _read(folder, key) or _kept(folder, key, make())
-    return _known[shape]
-
-
-@cache
-def _makers() -> str:
-    """All that shapes a template besides what is asked for: versions, and the code that makes it."""
-    here = Path(__file__).parent
-    code = hashlib.sha256(b"".join((here / f"{x}.py").read_bytes() for x in ("format", "checkpoint", "whole_file")))
-    return f"{FORMAT_VERSION} {h5py.version.hdf5_version} {versions()} {np.dtype(float).str} {code.hexdigest()}"
-
-
-def _read(folder: Path | None, key: str) -> bytes:
-    """A template that is kept; nothing if it is not there or not as it was written."""
-    with suppress(OSError):
-        data = (folder / (key + _SUFFIX)).read_bytes() if folder is not None else b""
-        if hashlib.sha256(data[_DIGEST:]).digest() == data[:_DIGEST]:
-            return data[_DIGEST:]
-    return b""
-
-
-def _kept(folder: Path | None, key: str, made: bytes) -> bytes:
-    """The template, kept if it can be; other processes may be doing the same."""
-    with suppress(OSError):
-        if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            old = sorted(folder.glob(f"*{_SUFFIX}"), key=os.path.getmtime)
-            for path in old[: max(0, len(old) - _KEPT + 1)]:
-                path.unlink(missing_ok=True)
-            new = folder / f"{key}.{os.getpid()}.new"
-            try:
-                new.write_bytes(hashlib.sha256(made).digest() + made)
-                os.replace(new, folder / (key + _SUFFIX))
-            finally:
-                new.unlink(missing_ok=True)
-    return made

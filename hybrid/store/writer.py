@@ -73,7 +73,7 @@ from hybrid.store.hdf5_file import (
 from hybrid.store.integrity import Tree, copy_unsigned, pack, sign, sign_new
 from hybrid.store.recorder import NUMBERS, Rows, Table, pause, write_rows
 from hybrid.store.records import FINER_RESULT, PENDING
-from hybrid.store.whole_file import LateFile, Layout, Restart, new_file
+from hybrid.store.whole_file import LateFile, Restart, new_file
 
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here
 NOTHING_MORE: Tree = {}  # what a run that is done leaves to go on with
@@ -235,6 +235,8 @@ def _remove_amendments(file: h5py.Group) -> None:
 # Outputs are held back at most so many times as long as writing takes: a reader hardly notices, a kill loses no more,
 # and a run that saves a thousand times a second spends 2 % of its time here instead of half.
 _PART = 50.0
+# s that it takes to make a dataset of a new file, of which several lines have thousands.
+_MAKING = 2e-4
 # Bytes of rows that wait at most, so that the memory of a long run stays flat: it computes 30 MB a second.
 _MOST_WAITING = 16_000_000
 
@@ -263,7 +265,6 @@ class Recorder(Rows):
     target: path, or a BytesIO or arrays for a result in memory, which has no checkpoints.
     outputs: the number of outputs if it is known; it only makes small files smaller.
     overwrite: replace an existing result.  Another program's file is never replaced.
-    templates: folder where templates of files are kept (store.whole_file); None: in this process alone.
     parts: results of lines by name, which are groups of this one, written and closed with it.
     """
 
@@ -278,7 +279,6 @@ class Recorder(Rows):
         outputs: int | None = None,
         overwrite: bool = False,
         mode: WriteMode = AT_ONCE,
-        templates: Path | None = None,
         parts: Mapping[str, Rows] | None = None,
     ) -> None:
         super().__init__(header)
@@ -286,7 +286,7 @@ class Recorder(Rows):
         self.path = Path(target).expanduser().resolve() if isinstance(target, str | Path) else None
         if self.path is not None:
             check_target(self.path, overwrite)
-        self._parts, self._layout, self._unseen = dict(parts or {}), Layout(outputs, templates), mode.unseen
+        self._parts, self._outputs_known, self._unseen = dict(parts or {}), outputs, mode.unseen
         self._before = None if self.path is None else mode.before
         self.files: Mapping[str, str] = {}  # digests of files that the run reads, for checkpoints
         self._file: Any = None  # once there is one
@@ -294,7 +294,9 @@ class Recorder(Rows):
         self._slots: list[h5py.Dataset] = []
         self._number = 0  # of the next checkpoint
         self._checkpoints: dict[int, bytes] = {}  # that wait, by number
-        self._flushed, self._pause = monotonic(), pause(0.0)  # when the file was last written; how long that holds, s
+        datasets = sum(len(x._fixed) + sum(len(y.fields) for y in x._all) for x in self._every().values())
+        # when the file was last written; how long that holds, s
+        self._flushed, self._pause = monotonic(), pause(_MAKING * datasets if self.path is not None else 0.0)
         self._broken = False
         if not mode.late:
             self._flushed = -np.inf
@@ -368,7 +370,7 @@ class Recorder(Rows):
 
     def _appear(self) -> None:
         """Let readers see a file, with all that there is now."""
-        self._continue_in(image_of(new_file(self.contents(), self._restart(), self._layout)))
+        self._continue_in(image_of(new_file(self.contents(), self._restart(), self._outputs_known)))
 
     def _continue_in(self, made: bytes | Callable[[Path], None]) -> None:
         """Write to a new file from now on; made: as of `created`."""
@@ -499,9 +501,9 @@ class Recorder(Rows):
         if isinstance(self._memory, MemoryTarget):
             self._memory.contents = contents
         elif self._memory is not None:
-            self._memory.write(image_of(new_file(contents, None, self._layout)))
+            self._memory.write(image_of(new_file(contents, None, self._outputs_known)))
         else:
             assert self.path is not None
-            self.late_file = LateFile(self.path, contents, self._restart(), self._layout)
+            self.late_file = LateFile(self.path, contents, self._restart(), self._outputs_known)
             if not (self.amended and status == "complete"):
                 self.late_file.place()

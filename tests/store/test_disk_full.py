@@ -26,7 +26,8 @@ from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.format import Field, Header, MemoryTarget
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import open_result
-from hybrid.store.writer import Recorder
+from hybrid.store.recorder import Rows
+from hybrid.store.writer import Recorder, WriteMode
 from tests.scenes import line_between, network_scene
 
 WRITER = """
@@ -145,21 +146,18 @@ def test_what_was_written_of_several_lines_stays(limit: int, tmp_path: Path) -> 
     assert bool(len(result.times)) == (limit > 1_000_000)
 
 
-# Files begin as templates; one that is missing or spoilt changes nothing in the result.
+# A file begins as one of the same datasets did before, if the process has made one.
 
 
 FIELDS = (Field("tension", "N", "tension", (5,), ("s",)), Field("energy/kinetic", "J", "kinetic energy"))
 HEIGHTS = Field("z", "m", "heights of the current", (2,), ("z",))
 
 
-def write(folder: Path, path: Path, fields: tuple[Field, ...] = FIELDS, length: float = 2.0) -> None:
-    """A result of one output; its template kept in the folder, or found there by what would be a new process."""
-    store._known.clear()
+def write(path: Path, fields: tuple[Field, ...] = FIELDS, length: float = 2.0) -> None:
+    """A result of one output."""
     s = np.linspace(0.0, length, 5)
     fixed = [(HEIGHTS, np.array([0.0, -length]))]
-    with Recorder(
-        path, Header(s, fields, (), {"title": "made up"}, {"scene": "a: 1"}, fixed), overwrite=True, templates=folder
-    ) as recorder:
+    with Recorder(path, Header(s, fields, (), {"title": "made up"}, {"scene": "a: 1"}, fixed)) as recorder:
         recorder.save(0.0, {f.name: np.ones(f.shape) for f in fields}, [("rod", 0.0, length)])
 
 
@@ -180,71 +178,19 @@ def content(path: Path) -> dict[str, tuple[str, list[object], list[tuple[str, st
     return out
 
 
-@pytest.fixture
-def kept(tmp_path: Path) -> Path:
-    """The one template of a folder, after a result was written that had none."""
-    write(tmp_path / "templates", tmp_path / "first.h5")
-    (found,) = (tmp_path / "templates").iterdir()
-    return found
-
-
-def test_a_template_that_was_kept_is_used_and_gives_the_same_file(
-    kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refused(*_: object) -> bytes:
-        raise AssertionError("made anew")
-
-    monkeypatch.setattr(store, "_template", refused)
-    write(kept.parent, tmp_path / "second.h5")
-    assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5")
-    write(kept.parent, tmp_path / "longer.h5", length=3.0)  # values are no part of it
+def test_the_second_file_of_the_same_datasets_is_as_the_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    create = store.Bare.create
+    monkeypatch.setattr(store, "_kept", {})
+    monkeypatch.setattr(store.Bare, "create", lambda *given: made.append(given[2]) or create(*given))
+    write(tmp_path / "first.h5")
+    write(tmp_path / "second.h5")
+    assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5") and len(made) == 1
+    write(tmp_path / "longer.h5", length=3.0)  # values are no part of it
     assert open_result(tmp_path / "longer.h5").s[-1] == 3.0 and open_result(tmp_path / "longer.h5")["z"][1] == -3.0
-    with pytest.raises(AssertionError, match="made anew"):
-        write(kept.parent, tmp_path / "other.h5", FIELDS[:1])
-
-
-@pytest.mark.parametrize("harm", ["empty", "cut off", "a changed byte", "a folder"])
-def test_a_spoilt_template_is_made_anew(harm: str, kept: Path, tmp_path: Path) -> None:
-    data = kept.read_bytes()
-    kept.unlink()
-    if harm == "a folder":
-        kept.mkdir()
-    else:
-        middle = len(data) // 2
-        changed = data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
-        kept.write_bytes({"empty": b"", "cut off": data[:middle], "a changed byte": changed}[harm])
-    write(kept.parent, tmp_path / "second.h5")
-    assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5")
-    assert harm == "a folder" or kept.read_bytes() == data
-
-
-def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("in the way")
-    write(tmp_path / "file", tmp_path / "first.h5")
-    assert len(open_result(tmp_path / "first.h5").times) == 1
-
-
-@pytest.mark.parametrize("what", ["h5py", "hybrid-cable"])
-def test_other_versions_have_other_templates(what: str, kept: Path, tmp_path: Path) -> None:
-    versions = store.versions()
-    before = versions[what]
-    try:
-        versions[what] = "0.0"
-        store._makers.cache_clear()
-        write(kept.parent, tmp_path / "second.h5")
-    finally:
-        versions[what] = before
-        store._makers.cache_clear()
-        store._known.clear()
-    assert len(list(kept.parent.iterdir())) == 2
-    assert open_result(tmp_path / "second.h5").versions[what] == "0.0"
-
-
-def test_old_templates_are_deleted(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store, "_KEPT", 2)
-    for n in (6, 7, 8):
-        write(kept.parent, tmp_path / "next.h5", (*FIELDS, Field("more", "", "numbers", (n,), ("k",))))
-    assert len(list(kept.parent.iterdir())) == 2 and not kept.exists()
+    assert len(made) == 1
+    write(tmp_path / "other.h5", FIELDS[:1])
+    assert len(made) == 2 and "energy/kinetic" not in content(tmp_path / "other.h5")
 
 
 # How often a run hands over what it has: by what making and writing it take.
@@ -274,6 +220,15 @@ def test_what_is_dear_to_make_waits_ten_times_as_long(recorder: Any, now: list[f
         now[0] += 0.99 * pause
         assert not recorder.due
         now[0] += 0.02 * pause
+        assert recorder.due
+
+
+def test_a_first_file_of_many_lines_waits_ten_times_as_long_as_it_takes(tmp_path: Path, now: list[float]) -> None:
+    lines = {str(k): Rows(GIVEN) for k in range(100)}  # of 16 datasets each, 0.2 ms a dataset
+    with writer.Recorder(tmp_path / "x.h5", GIVEN, mode=WriteMode(late=True), parts=lines) as recorder:
+        now[0] += 3.1
+        assert not recorder.due
+        now[0] += 0.3
         assert recorder.due
 
 
