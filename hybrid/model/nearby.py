@@ -295,7 +295,7 @@ def refined(state: State, coarse: Line, line: Line) -> State:
     middle = 0.5 * (line.s[:-1] + line.s[1:])
     out.T[:] = np.interp(middle, 0.5 * (coarse.s[:-1] + coarse.s[1:]), state.T)
     of = np.clip(np.searchsorted(coarse.s, middle) - 1, 0, coarse.h.size - 1)
-    _carry_directors(line, state.e[of], state.a1[of], out)
+    carry_directors(line, state.e[of], state.a1[of], out)
     return out
 
 
@@ -318,11 +318,11 @@ def picked(line: Line, state: State, at: np.ndarray, turns: Floats | None = None
     if not out.e.any(axis=1).all():
         return None
     out.T[:] = np.add.reduceat(state.T, at[:-1]) / np.diff(at)
-    _carry_directors(line, state.e[at[:-1]], state.a1[at[:-1]], out)
+    carry_directors(line, state.e[at[:-1]], state.a1[at[:-1]], out)
     return out
 
 
-def _carry_directors(line: Line, chords: Floats, a: Floats, state: State) -> None:
+def carry_directors(line: Line, chords: Floats, a: Floats, state: State) -> None:
     """First directors of a state: those (N, 3) of other chords (N, 3), which turn to its chords without spin.
 
     In a plane they turn about its normal, however far; in space they are made normal to chords that turn by less than

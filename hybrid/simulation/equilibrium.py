@@ -25,7 +25,7 @@ from hybrid.kernels.state.report import FRICTION, OBSTACLES, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model, as_kept, leaves_plane, planar
 from hybrid.model.initial_shape import GIVEN, HUNG, reasons_against
-from hybrid.model.nearby import MANY, coarser, refined
+from hybrid.model.nearby import MANY, carry_directors, coarser, refined
 from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.base import dotted
@@ -47,8 +47,8 @@ CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
 # and acceleration there counts as the same.
 MOST_ROUNDS, SAME_WATER = 40, 1e-8
 # Other places of what is free from which an equilibrium is sought where all else has failed: how many, and how far
-# from the first ones, as a part of the shortest line.
-OTHER_PLACES = 4
+# from the first ones, as a part of the shortest line (bench/test_bench_network_statics.py).
+OTHER_PLACES = 10
 ELSEWHERE = 1.0
 # Lengths of its line from a held point to the first place of another, beyond which that is named where no equilibrium
 # is found; nearer ones are found.
@@ -84,14 +84,26 @@ class _Asked(NamedTuple):
                 yield "lines hung between places that balance", NetworkState(*starts_between(system, *places, model))
 
     def elsewhere(self) -> Iterator[Start]:
-        """Shapes between other places of what is free, the same at every call; none where nothing is."""
+        """Shapes between other places, the same at every call, then the equilibrium of lines that may be slack.
+
+        None where nothing is free.
+        """
         model, system = self.model, self.system.searched()
+        if not len(model.places) + len(model.body_places):
+            return
         chance, reach = np.random.default_rng(0), ELSEWHERE * min(x.length for x in model.models)
-        for _ in range(OTHER_PLACES if len(model.places) + len(model.body_places) else 0):
+        for _ in range(OTHER_PLACES):
             places, bodies = model.places.copy(), model.body_places.copy()
             for row in (*places, *bodies[:, PLACE:FRAME]):
                 row += reach * chance.uniform(-1.0, 1.0, 3)
             yield "lines hung between other places", NetworkState(*starts_between(system, places, bodies, model))
+        with suppress(LineFailed):
+            group = group_of(model, self.t, self.bodies)
+            group = group._replace(lines=[_without_bending(x) for x in group.lines])
+            found = lines_at_rest(group, self.starts(), _other_shapes(model)).state
+            for x, state in zip(model.models, found.lines, strict=True):
+                carry_directors(x.line, x.start.e, x.start.a1, state)
+            yield "the equilibrium without bending, slack or not", found
 
 
 def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
@@ -404,6 +416,12 @@ def _on_its_side(asked: _Asked, group: Group, start: Start | None = None, quick:
             if quick:
                 raise
     return search(asked.starts() if start is None else [start], refused=lost if turned else None)
+
+
+def _without_bending(x: JoinedLine) -> JoinedLine:
+    """The line as a catenary, of which a slack equilibrium will do."""
+    line = x.line._replace(element=np.zeros_like(x.line.element), spin=np.zeros_like(x.line.spin))
+    return x._replace(line=line, slackens=True)
 
 
 def _has_side(model: Model) -> bool:
