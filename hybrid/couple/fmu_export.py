@@ -93,7 +93,6 @@ def _write_scene(scene: Scene, folder: Path) -> list[Path]:
 def _interface(scene: Scene) -> dict[str, Any]:
     """What may be set of the ends or points, and where they begin."""
     with Simulation(scene) as made:
-        time, several = scene.require_time(), "" not in scene.asked_lines
         points = {
             name: {
                 "settable": sorted(made.settable(name)),
@@ -101,11 +100,9 @@ def _interface(scene: Scene) -> dict[str, Any]:
             }
             for name in scene.points
         }
-        found: dict[str, Any] = {"step": time.step, "duration": time.duration}
-        if several:
-            for of in points.values():  # a frame is of one line, and turns with no point
-                of["settable"] = [x for x in of["settable"] if x != "frame"]
-            return found | {"points": points, "lines": [*made.scene.lines]}
-        payout = next(filter(None, (getattr(end, "payout", None) for end in made.scene.ends.both)), None)
-        winch = payout is not None and payout.from_outside
-        return found | {"ends": points, "payout": payout is not None, "winch": winch}
+        lines = {}
+        for name, line in scene.asked_scenes.items():
+            payout = next(filter(None, (getattr(end, "payout", None) for end in line.ends.both)), None)
+            lines[name] = {"payout": payout is not None, "winch": payout is not None and payout.from_outside}
+        time = scene.require_time()
+        return {"step": time.step, "duration": time.duration, "points": points, "lines": lines}

@@ -3,9 +3,7 @@
 Inputs are what the ends reach at the end of a communication step: place (m), velocity (m/s) and rotation vector (rad,
 from the start's frame) of held ends, force (N) and moment (N m) of free ones; all inertial.  Outputs are forces and
 moments of the cable on what holds its ends, places and velocities of the ends, the largest and the lowest tension.
-Of several lines points stand in place of ends: places and velocities of fixed ones that the scene does not move, and
-forces on free ends of one line, are inputs, the force of its lines on each, its place and velocity, and tensions of
-each line are outputs.
+Of lines that have names points stand in place of ends, and what is of a line begins with its name.
 """
 
 from __future__ import annotations
@@ -41,27 +39,23 @@ UNITS = (
 # Of a communication step: how far the master's clock may be from that of the cable.
 CLOCK = 1e-6
 INPUTS = {
-    "position": ("m", "place of the end at the end of a step"),
-    "velocity": ("m/s", "velocity of the end there"),
+    "position": ("m", "place of the {} at the end of a step"),
+    "velocity": ("m/s", "velocity of the {} there"),
     "rotation": ("rad", "rotation vector from its frame at the start, at the end of a step"),
-    "applied_force": ("N", "force on the free end from the next step on"),
-    "applied_moment": ("N.m", "moment on the free end from the next step on"),
+    "applied_force": ("N", "force on the free {} from the next step on"),
+    "applied_moment": ("N.m", "moment on the free {} from the next step on"),
 }
 # What `Simulation.settable` says where these may be set.
 SET_BY = {
     "position": "position", "velocity": "position", "rotation": "frame", "applied_force": "force",
     "applied_moment": "moment",
 }  # fmt: skip
+# With the numbers of a `PointState` that they are.
 OUTPUTS = {
-    "force": ("N", "force of the cable on what holds the end"),
-    "moment": ("N.m", "moment of the cable on what holds the end"),
-    "node_position": ("m", "where the end is"),
-    "node_velocity": ("m/s", "velocity of the end"),
-}
-OF_POINTS = {
-    "force": ("N", "force of the lines on the point"),
-    "node_position": ("m", "where the point is"),
-    "node_velocity": ("m/s", "velocity of the point"),
+    "force": ("N", "force of its lines on the {}", 2),
+    "moment": ("N.m", "moment of its lines on the {}", 3),
+    "node_position": ("m", "where the {} is", 0),
+    "node_velocity": ("m/s", "velocity of the {}", 1),
 }
 
 
@@ -84,60 +78,63 @@ class SceneUnit:
         self._register_parts(known)
 
     def _register_parts(self, known: dict[str, Any]) -> None:
-        """Of every end or point what may be set and read; the length that is out, the tension."""
-        self._is_cable = "ends" in known
-        self.payout_rate, self._winch = 0.0, bool(known.get("winch"))
-        self._points: dict[str, dict[str, Any]] = known["ends"] if self._is_cable else known["points"]
+        """Of every end or point what may be set and read; of every line the length that is out, and its tension."""
+        if isinstance(known.get("lines"), list):  # as 1.0.0 has exported several lines, of which nothing was paid out,
+            known["lines"] = {name: {} for name in known["lines"]}
+        of_lines = known.get("lines", {"": known})  # and one
+        self._called = "end" if "" in of_lines else "point"
+        self._points: dict[str, dict[str, Any]] = known.get("points") or known["ends"]
         for name, of in self._points.items():
             self._register_point(name, of["settable"], np.array(of["position"]))
-        if self._winch:
+        self._winches = dict[str, str]()
+        for name, of in of_lines.items():
+            self._register_line(name, bool(of.get("payout")), bool(of.get("winch")))
+
+    def _register_line(self, line: str, payout: bool, winch: bool) -> None:
+        """The variables of a line, which begin with its name."""
+        before, along = (f"{line}.", f"along line {line}") if line else ("", "along the cable")
+        if winch:
+            self._winches[line] = f"{before}payout_rate"
             text = "rate at which line is paid out at the end of a step; negative: taken in"
-            what = {"causality": Fmi3Causality.input, "variability": Fmi3Variability.continuous, "unit": "m/s"}
-            self.register_variable(Float64("payout_rate", description=text, **what))  # type: ignore[attr-defined]
-        if known.get("payout"):
-            self.output("length", "m", "unstretched length that is out", lambda: self.simulation.length)
-        if self._is_cable:
-            self.tensions("", "", "along the cable")
-        for line in known.get("lines", ()):
-            self.tensions(line, f"{line}.", f"along line {line}")
+            self.vector(f"{before}payout_rate", "m/s", text, np.zeros(1))
+        if payout:
+            text = "unstretched length that is out"
+            self.output(f"{before}length", "m", text, lambda: self._length(line))
+        self.tensions(line, before, along)
 
     def _register_point(self, point: str, settable: Any, position: Floats) -> None:
         """The variables of an end or a point.  settable: of several lines exported by 1.0.0 whether it is."""
         names = {True: ("position",), False: ()}[settable] if isinstance(settable, bool) else settable
-        called = "end" if self._is_cable else "point"
         for name, (unit, text) in INPUTS.items():
             if SET_BY[name] in names:
                 begin = position if name == "position" else np.zeros(3)
-                self.vector(point, name, unit, text.replace("end at", f"{called} at"), begin)
-        for name, (unit, text) in (OUTPUTS if self._is_cable else OF_POINTS).items():
-            self.vector(point, name, unit, text, None)
+                self.vector(f"{point}.{name}", unit, text.format(self._called), begin)
+                if name == "velocity":  # whether the master has ever given another one than zero
+                    self._values[f"{point}.moves"] = np.zeros(1)
+        for name, (unit, text, _) in OUTPUTS.items():
+            self.vector(f"{point}.{name}", unit, text.format(self._called), None)
 
     @property
     def simulation(self) -> Simulation:
         """The simulation, begun when it is first needed: parameters are set before."""
         if self._simulation is None:
-            self._simulation = Simulation(self._folder / SCENE, self.output_file or None)
-            if self._is_cable:
-                self._frames = dict(zip(self._points, self._simulation.frames(), strict=True))
+            self._simulation = made = Simulation(self._folder / SCENE, self.output_file or None)
+            self._frames = {name: made.point(name).frame for name in self._points}
         return self._simulation
 
     def _value_of(self, part: str, name: str) -> Floats:
         """An output (3,) of an end or a point; NaN: of a step that has failed."""
-        simulation = self.simulation
         try:
-            if name in ("moment", "force") and self._is_cable:
-                return simulation.forces()[list(self._points).index(part) + 2 * (name == "moment")]
-            point = simulation.point(part)
+            return np.asarray(self.simulation.point(part)[OUTPUTS[name][2]])
         except ValueError as error:  # an exception here would end the master
             self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
             return np.full(3, np.nan)
-        return {"force": point.force, "node_position": point.position, "node_velocity": point.velocity}[name]
 
     def _apply(self, step: float) -> None:
         """Hand the inputs of a step (s) to the simulation."""
         values = self._values
-        if self._winch:
-            self.simulation.set_payout(self.payout_rate)
+        for line, name in self._winches.items():
+            self.simulation.set_payout(*filter(None, [line]), float(values[name][0]))
         for name in self._points:
             placed, turn = self.placed(name, step), values.get(f"{name}.rotation")
             frame = None if turn is None else rotation(turn) @ self._frames[name]
@@ -169,25 +166,31 @@ class SceneUnit:
         self.output(f"{prefix}tension_max", "N", f"largest tension {of}", lambda: float(self._tension(line).max()))
         self.output(f"{prefix}tension_min", "N", f"lowest tension {of}", lambda: float(self._tension(line).min()))
 
-    def vector(self, end: str, name: str, unit: str, text: str, begin: Floats | None) -> None:
-        """Three scalars, which all masters can connect."""
+    def vector(self, name: str, unit: str, text: str, begin: Floats | None) -> None:
+        """Scalars, which all masters can connect: three of a vector, or one number.
+
+        begin: of an input; None: it is an output of an end or a point.
+        """
         if begin is not None:
-            self._values[f"{end}.{name}"] = begin
-            if name == "velocity":
-                self._values[f"{end}.moves"] = np.zeros(1)  # whether the master has ever given another one than zero
+            self._values[name] = begin
         causality = Fmi3Causality.output if begin is None else Fmi3Causality.input
-        for axis, letter in enumerate("xyz"):
+        for axis, letter in enumerate("xyz" if begin is None or begin.size == 3 else [""]):
 
             def get(axis: int = axis) -> float:
-                return float((self._values[f"{end}.{name}"] if begin is not None else self._value_of(end, name))[axis])
+                return float((self._values[name] if begin is not None else self._value_of(*name.rsplit(".", 1)))[axis])
 
             def put(value: float, axis: int = axis) -> None:
-                self._values[f"{end}.{name}"][axis] = value
+                self._values[name][axis] = value
 
             variable = Float64(
-                f"{end}.{name}.{letter}", causality=causality, variability=Fmi3Variability.continuous, unit=unit,
-                description=f"{text}, {letter}", getter=get, setter=put if begin is not None else None,
-            )  # fmt: skip
+                f"{name}.{letter}".rstrip("."),
+                causality=causality,
+                variability=Fmi3Variability.continuous,
+                unit=unit,
+                description=f"{text}, {letter}".rstrip(", "),
+                getter=get,
+                setter=put if begin is not None else None,
+            )
             self.register_variable(variable, nested=False)  # type: ignore[attr-defined]
 
     def placed(self, part: str, step: float) -> tuple[Floats, Floats | None] | None:
@@ -209,6 +212,10 @@ class SceneUnit:
                 self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
                 return np.full(1, np.nan)
         return self._recovered[line]
+
+    def _length(self, line: str) -> float:
+        simulation = self.simulation
+        return float(np.ptp(simulation.line(line).s)) if line else simulation.length
 
     # --- what a master calls ------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ wrong uses raise ValueError in words.  Functions that have no meaning here are n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,11 @@ BODY_TYPE_COUPLED = -1
 _TYPES = {"free": POINT_TYPE_FREE, "coupled": POINT_TYPE_COUPLED}
 # Of a step: how far the clock of the caller may be from ours.
 CLOCK = 1e-6
+
+
+def _unloaded(position: Floats, velocity: Floats) -> PointState:
+    """A point that no line pulls at."""
+    return PointState(position, velocity, np.zeros(3), np.zeros(3), np.full((3, 3), nan))
 
 
 class MoorDynBody:
@@ -202,7 +207,7 @@ class MoorDyn:
         """A point now; before `Init` where the deck has it, at rest, without force."""
         if self.simulation is None and self.origin == inf and not self.closed:
             place = self.first_places()[name][0] if self.scene is None else self.scene.first_place(name)
-            return PointState(np.array(place, float), np.zeros(3), np.zeros(3))
+            return _unloaded(np.array(place, float), np.zeros(3))
         return self.running.point(name)
 
     def forces(self, x: Floats) -> list[float]:
@@ -491,7 +496,7 @@ class PlacesAlone:
 
     def point(self, name: str) -> PointState:
         position, velocity = self._places[name]
-        return PointState(position, velocity, np.zeros(3))
+        return _unloaded(position, velocity)
 
     def line(self, name: str) -> CableState:
         raise ValueError(f"line {name}: the deck has none")

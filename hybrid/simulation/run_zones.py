@@ -1,8 +1,8 @@
-"""Zones that move in lines of a system: each line has a domain manager of its own, as one cable has.
+"""Zones that move: each line has a domain manager of its own.
 
 Stiffness and lengths of lines whose zones change follow the step that is tried; after it criteria are weighed, and a
 line that needs more rod gets it before the step is repeated.  After an accepted step, and its outputs, what the manager
-proposes is carried out: the line has other cells then, and the system another solver.
+proposes is carried out: the line has other cells then, and the network another solver.
 """
 
 from __future__ import annotations

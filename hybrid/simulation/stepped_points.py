@@ -50,11 +50,17 @@ R = TypeVar("R")
 
 
 class PointState(NamedTuple):
-    """Where a point is (3,) m, how fast (3,) m/s, and the force (3,) N of its lines on it; inertial."""
+    """Where a point is (3,) m, how fast (3,) m/s, and what its lines do to it; all inertial.
+
+    force: (3,) N; moment: (3,) N m, of lines that are clamped there; frame: (3, 3) columns a1, a2 and the tangent along
+    increasing s of the only line there, whose direction the point holds, else NaN.
+    """
 
     position: Floats
     velocity: Floats
     force: Floats
+    moment: Floats
+    frame: Floats
 
 
 def of_line(method: Callable[Concatenate[Any, str, P], R]) -> Callable[..., R]:
@@ -352,16 +358,21 @@ class SteppedPoints(SettableObstacles):
 
     @one_thread
     def point(self, name: str) -> PointState:
-        """Where a point is, and the force of its lines on it; of a free point without the loads on itself.
+        """Where a point is, and what its lines do to it; of a free point without the loads on itself.
 
         ValueError: a step has failed.
         """
         self._check_sound()
-        here, force = self._ends_at(name), np.zeros(3)
+        run, here, force, moment = self._run, self._ends_at(name), np.zeros(3), np.zeros(3)
         for line, k in here:
-            force += self._run.solver.work[line].report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
-        state = self._run.state.lines[line]
-        return PointState(state.r[-k].copy(), state.v[-k].copy(), force)
+            report = run.solver.work[line].report
+            force += report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
+            if run.model.models[line].line.element[-k]:
+                moment += (1.0, -1.0)[k] * report[MOMENT_A + 3 * k : MOMENT_A + 3 * k + 3]
+        state, frame = run.state.lines[line], np.full((3, 3), np.nan)
+        if self._turns_alone(name):
+            frame = run.model.models[line].ends.values.frame[k].reshape(3, 3).copy()
+        return PointState(state.r[-k].copy(), state.v[-k].copy(), force, moment, frame)
 
     @of_line
     @one_thread
@@ -384,10 +395,8 @@ class SteppedPoints(SettableObstacles):
 
         NaN where an end holds no direction.
         """
-        model = self._only
-        frames = model.ends.values.frame.reshape(2, 3, 3).copy()
-        frames[[k for k in (0, 1) if not model.line.element[-k]]] = np.nan
-        return frames
+        assert self._only is not None
+        return np.array([self.point(name).frame for name in self._places])
 
     @one_thread
     def forces(self, name: str | None = None) -> Any:

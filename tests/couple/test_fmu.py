@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import runpy
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import inf, nan
 from pathlib import Path
@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.scene.root import in_full
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENE = """
@@ -32,6 +33,8 @@ model: catenary
 mesh: {cells: 10}
 time: {duration: 2, step: 0.05}
 """
+# A scene in the short form and with names for its points and its line.
+FORMS = pytest.mark.parametrize("form", [lambda scene: scene, in_full], ids=["cable", "network"])
 ROD = SCENE.replace("diameter: 0.02", "diameter: 0.02, bending_stiffness: 20, torsional_stiffness: 15").replace(
     "model: catenary", "model: rod").replace("start: {kind: pinned", "start: {kind: clamped, tangent: [1, 0, -1]")  # fmt: skip
 
@@ -146,8 +149,9 @@ def test_several_lines_are_a_unit_whose_points_are_set(tmp_path: Path) -> None:
     )
 
 
-def test_a_frame_turns_by_a_rotation_vector(tmp_path: Path) -> None:
-    scene = hybrid.parse_scene(ROD)
+@FORMS
+def test_a_frame_turns_by_a_rotation_vector(tmp_path: Path, form: Callable[[hybrid.Scene], hybrid.Scene]) -> None:
+    scene = form(hybrid.parse_scene(ROD))
     unit = hybrid.export_fmu(scene, tmp_path / "rod.fmu")
     turns = np.linspace(0.0, 0.5, 11)[1:]
     with running(unit, tmp_path / "open") as (cable, number):
@@ -156,12 +160,14 @@ def test_a_frame_turns_by_a_rotation_vector(tmp_path: Path) -> None:
             step(cable, k)
         moment = cable.getFloat64([number[f"start.moment.{x}"] for x in "xyz"])
     with hybrid.Simulation(scene) as same:
-        frame = same.frames()[0]
+        frame = same.point("start").frame
         for turn in turns:
             c, s = np.cos(turn), np.sin(turn)
-            same.set_end("start", [0, 0, 0], frame=np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ frame)
-            same.set_end("end", [10, 0, 0])
+            same.set_point("start", [0, 0, 0], frame=np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ frame)
+            same.set_point("end", [10, 0, 0])
             same.step()
+        assert np.array_equal(same.point("start").moment, same.forces().moment_start)
+        assert np.array_equal(same.frames()[0], same.point("start").frame, equal_nan=True)
         assert moment == pytest.approx(same.forces().moment_start, abs=1e-7 * np.abs(same.forces().moment_start).max())
 
 
@@ -306,14 +312,16 @@ def test_what_is_no_unit_is_not_replaced(tmp_path: Path) -> None:
     assert not (tmp_path / "a.fmu").exists()
 
 
-def test_a_winch_is_an_input(tmp_path: Path) -> None:
+@FORMS
+def test_a_winch_is_an_input(tmp_path: Path, form: Callable[[hybrid.Scene], hybrid.Scene]) -> None:
     scene = SCENE.replace("[10, 0, 0]}", "[10, 0, 0], payout: {longest: 14}}").replace(", axial_stiffness: 1e5", "")
-    unit = hybrid.export_fmu(hybrid.parse_scene(scene), tmp_path / "winch.fmu")
+    scene = form(hybrid.parse_scene(scene))
+    unit, of = hybrid.export_fmu(scene, tmp_path / "winch.fmu"), "" if "" in scene.asked_lines else "cable."
     with running(unit, tmp_path / "open") as (cable, number):
         for k in range(40):
-            cable.setFloat64([number["payout_rate"]], [0.5 * (k + 1) / 40.0])
+            cable.setFloat64([number[f"{of}payout_rate"]], [0.5 * (k + 1) / 40.0])
             step(cable, k)
-        assert cable.getFloat64([number["length"]]) == pytest.approx([12.5])
+        assert cable.getFloat64([number[f"{of}length"]]) == pytest.approx([12.5])
 
 
 def test_tensions_are_those_of_the_result_ends_included(tmp_path: Path) -> None:

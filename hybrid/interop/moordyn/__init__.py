@@ -20,8 +20,8 @@ __all__ = ["ImportedDeck", "ImportedScene", "Note", "WrittenDeck", "export_moord
 
 # Sections of which no row has a place in a scene: why, and what to do.
 _NO_PLACE = {
-    "failure": ("lines of hybrid do not break", "compute the broken line as a scene of its own"),
-    "control": ("winches that follow a controller; payout is not computed", ""),
+    "failure": ("when a line breaks is not read", "give `break_at` of its point"),
+    "control": ("winches that follow a controller", "give `payout` of the end of the line, or set it from outside"),
     "external loads": ("steady forces and dampers on points, rods and bodies", "a force acts on `kind: free` ends"),
 }
 

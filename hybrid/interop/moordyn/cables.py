@@ -1,7 +1,7 @@
 """Which lines of a deck are one cable, and what is at its ends.
 
-hybrid computes one cable at a time.  Lines that meet end to end at a free point where nothing else is attached are one
-cable of several sections; every other line is a cable of its own.  What a scene cannot hold a cable by is left out.
+Where each cable becomes a scene of its own, lines that meet end to end at a free point where nothing else is attached
+are one cable of several sections; every other line is a cable of its own.  What it cannot be held by is left out.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ def _on_body(body: Body, place: Triple, along: Triple | None, line: int) -> End:
         return End(at, line, lost=note(LEFT_OUT, body.row, *_TURBINE))
     fix = _MOTION
     if body.kind in ("free", "pinned"):
-        fix = "give ends.{end}.position and .motion as MoorDyn finds them; six motions of a body are not computed"
+        fix = "give ends.{end}.position and .motion as MoorDyn finds them, or import all lines, whose bodies move"
     notes = (note(TAKEN, body.row, held, fix),) if held else ()
     return End(at, line, _rotated(body.angles, along) if along is not None else None, notes=notes)
 
