@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from test_jacobian import CA, CV, ZONES, N, assembled, random_case
+from test_planar import flat_case
 
 from hybrid.kernels.algebra.block_elimination import ROW, SPAN, exchange
 from hybrid.kernels.algebra.kept_factors import SWEEP, carry_given, prepare_sweep, solve_again, solve_backward, sweep
+from hybrid.kernels.algebra.plane import TRIPLE
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.run.entry import assembly, workspace
 
@@ -102,13 +104,14 @@ def test_kept_factors_solve_any_right_hand_side(name, held):
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
-def test_keeping_factors_changes_nothing():
+@pytest.mark.parametrize(("case", "size"), [(random_case, 45), (flat_case, TRIPLE)], ids=["space", "plane"])
+def test_keeping_factors_changes_nothing(case, size):
     """Bit for bit: what is kept is a copy."""
-    line, sea, ends, st = random_case(5, ZONES["three"], 2047)
+    line, sea, ends, st = case(5, ZONES["three"], 2047)
     found = []
     for keep in (False, True):
         work = workspace(N, keep)
         assembly(line, sea, ends, st, CV, CA, work)
-        found.append((work.X[: (N + 1) * 45].copy(), work.report.copy()))
+        found.append((work.X[: (N + 1) * size].copy(), work.report.copy()))
     np.testing.assert_array_equal(found[0][0], found[1][0])
     np.testing.assert_array_equal(found[0][1], found[1][1])

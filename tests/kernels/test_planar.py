@@ -8,13 +8,11 @@ import itertools
 
 import numpy as np
 import pytest
-from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, in_soil, random_case, with_tables
+from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, assembled, in_soil, random_case, with_tables
 
-from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
-from hybrid.kernels.algebra.plane import KEPT, TRIPLE, WIDE, solve_again_planar
+from hybrid.kernels.algebra.plane import KEPT, TRIPLE, solve_again_planar
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
-from hybrid.kernels.march.march import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.state import report
 from hybrid.kernels.state.report import PLANAR, RESIDUAL, RESIDUAL_NODE
@@ -107,47 +105,42 @@ def in_plane(line, *rest):
     return solved(line, *rest)
 
 
+def assert_same(line, *case):
+    """Both marches give the same correction, nothing across the plane, and the same forces, moments and powers."""
+    u = np.zeros((N + 1, 3))
+    _, x, told = in_space(line, *case, u)
+    _, y, said = in_plane(line, *case, u)
+    assert x is not None and y is not None
+    assert np.abs(x[:, 1:4] @ line.plane[2]).max() < 1e-9 * np.abs(x).max()
+    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
+    largest = slice(RESIDUAL, RESIDUAL_NODE + 1)  # the largest component of a force depends on the axes
+    told[largest] = said[largest]
+    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("held", [(0, 0), (1, 0), (1, 1)])
 @pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, WITHOUT_OBSTACLES)))
 def test_both_marches_give_the_same_correction(zones, bits, held, seed):
-    """Also across the plane, where that in space finds nothing; and the same forces, moments and powers."""
-    case = flat_case(seed, ZONES[zones], bits, held, anisotropic=seed == 1)
-    u = np.zeros_like(case[-1].r)
-    _, x, told = in_space(*case, u)
-    _, y, said = in_plane(*case, u)
-    assert x is not None and y is not None
-    assert np.abs(x[:, 1:4] @ case[0].plane[2]).max() < 1e-9 * np.abs(x).max()
-    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
-    told[RESIDUAL : RESIDUAL_NODE + 1] = said[
-        RESIDUAL : RESIDUAL_NODE + 1
-    ]  # the largest component of a force depends on the axes
-    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+    """So that what is solved in the plane has the derivatives of that in space (test_jacobian)."""
+    assert_same(*flat_case(seed, ZONES[zones], bits, held, anisotropic=seed == 1))
 
 
 @pytest.mark.parametrize("bits", [0, report.STIFFNESS_DAMPING])
 @pytest.mark.parametrize("seed", range(3))
 def test_both_marches_bend_by_the_same_tables(bits, seed):
     line, *rest = flat_case(seed, ZONES["rod"], bits, (1, 0))
-    line, u = with_tables(line), np.zeros((N + 1, 3))
+    line = with_tables(line)
     line.kb[4, 2] = 0.8
-    _, x, told = in_space(line, *rest, u)
-    _, y, said = in_plane(line, *rest, u)
-    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
-    told[RESIDUAL : RESIDUAL_NODE + 1] = said[RESIDUAL : RESIDUAL_NODE + 1]
-    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+    assert_same(line, *rest)
 
 
 @pytest.mark.parametrize("bits", [0, report.FRICTION, report.FRICTION | report.BREAKOUT])
 @pytest.mark.parametrize("seed", range(3))
 def test_both_marches_lie_in_the_same_soil(bits, seed):
     line, sea, ends, st = flat_case(seed, ZONES["rod"], bits, (1, 0))
-    (line, sea, st), u = in_soil(line, sea, st), np.zeros((N + 1, 3))
-    _, x, told = in_space(line, sea, ends, st, u)
-    _, y, said = in_plane(line, sea, ends, st, u)
-    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
-    told[RESIDUAL : RESIDUAL_NODE + 1] = said[RESIDUAL : RESIDUAL_NODE + 1]
-    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+    line, sea, st = in_soil(line, sea, st)
+    assert_same(line, sea, ends, st)
 
 
 @pytest.mark.parametrize("held", [(0, 0), (1, 1), (1, 0)])
@@ -172,54 +165,6 @@ def test_kept_factors_solve_any_right_hand_side(zones, held):
         found.append(x)
     plane, space = found
     np.testing.assert_allclose(plane, space, rtol=0, atol=1e-8 * np.abs(space).max())
-
-
-def test_keeping_factors_changes_nothing():
-    """Bit for bit: what is kept is a copy."""
-    line, sea, ends, st = flat_case(5, ZONES["three"], 2047)
-    found = []
-    for keep in (False, True):
-        work = workspace(N, keep)
-        assembly(line, sea, ends, st, CV, CA, work)
-        found.append((work.X[: (N + 1) * TRIPLE].copy(), work.report.copy()))
-    np.testing.assert_array_equal(found[0][0], found[1][0])
-    np.testing.assert_array_equal(found[0][1], found[1][1])
-
-
-def dense(rows):
-    J, b = np.zeros((3 * N + 3, 3 * N + 3 + 16)), np.zeros(3 * N + 3)
-    for i in range(N + 1):
-        block = rows[i].reshape(3, WIDE)
-        o = 3 * i + 6
-        for columns, places in (
-            ((0, 1), (-5, -4)), ((2, 3), (-2, -1)), ((4, 5, 6), (0, 1, 2)), ((7, 8, 9), (3, 4, 5)), ((10, 11), (7, 8)),
-        ):  # fmt: skip
-            J[3 * i : 3 * i + 3, [o + k for k in places]] = block[:, list(columns)]
-        b[3 * i : 3 * i + 3] = block[:, 12]
-    return J[:, 6 : 6 + 3 * N + 3], b
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, WITHOUT_OBSTACLES)))
-def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
-    line, sea, ends, st = flat_case(3, ZONES[zones], bits)
-    J, _ = dense(in_plane(line, sea, ends, st, np.zeros_like(st.r))[0])
-    numeric, t = np.zeros_like(J), 1e-4
-
-    def residual(j, way):
-        x = np.zeros((N + 1, 5))
-        x[j // 3, 0] = way if j % 3 == 0 else 0.0
-        if j % 3:
-            x[j // 3, 1:4] = way * line.plane[j % 3 - 1]
-        s, work = st.copy(), workspace(N)._replace(x=x)
-        update(line.plane, None, line, s, CV, CA, 1.0, False, work)
-        return dense(in_plane(line, sea, ends, s, work.u)[0])[1]
-
-    for j in range(3 * N + 3):
-        f = [residual(j, k * t) for k in (-2, -1, 1, 2)]
-        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
-    numeric[0, 0] = 1.0  # there is no cell before the start
-    assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
 
 
 def test_a_singular_block_is_named():
@@ -254,28 +199,13 @@ def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     pushed = st._replace(
         v=st.v + small * np.outer(was[:, 1] - cv * dt * was[:, 1], n), vd=st.vd - small * ca * dt * np.outer(was[:, 1], n)
     )  # fmt: skip
-    J, b0 = _assembled(line, sea, ends, st, cv, ca)
-    _, b1 = _assembled(line, sea, ends, pushed, cv, ca)
+    line, still = line._replace(bits=line.bits & ~PLANAR), np.zeros_like(st.r)
+    J, b0 = assembled(line, sea, ends, st, still, cv, ca)
+    _, b1 = assembled(line, sea, ends, pushed, still, cv, ca)
     x = np.linalg.solve(J, b1 - b0).reshape(-1, 5) / small
     w = x[:, 1:4] @ n
     assert np.abs(w - now[:, 0]).max() < 1e-5 * np.abs(w).max()
     assert np.abs(now[:, 1] - (was[:, 1] + cv * (now[:, 0] - dt * was[:, 1]))).max() < 1e-9 * np.abs(now[:, 1]).max()
-
-
-def _assembled(line, sea, ends, st, cv, ca):
-    rows = in_space(line, sea, ends, st, np.zeros_like(st.r), cv, ca)[0]
-    return _dense(rows), rows.reshape(N + 1, SIZE, WIDTH)[:, :, 23].ravel()
-
-
-def _dense(rows):
-    """The matrix of block rows in space."""
-    n = N + 1
-    J = np.zeros((5 * n, 5 * n + 25))
-    for i in range(n):
-        block = rows[i].reshape(SIZE, WIDTH)
-        J[5 * i : 5 * i + 5, 5 * i : 5 * i + 20] = block[:, :20]
-        J[5 * i : 5 * i + 5, 5 * i + 21 : 5 * i + 24] = block[:, 20:23]
-    return J[:, 10 : 10 + 5 * n]
 
 
 def test_band_of_the_push_fits_its_work_array():
@@ -293,9 +223,7 @@ def test_stiffness_across_the_plane_is_definite_when_that_in_space_is(zones, pre
     st.T[:] = 2.0 + pressed
     st.v[:] = st.vd[:] = 0.0
     n, soft = line.plane[2], 1e-3
-    work = workspace(N)._replace(rows=block_rows(line._replace(bits=0)))
-    assembly(line._replace(bits=line.bits & ~PLANAR), sea, ends, st, 0.0, soft, work)
-    J = -_dense(work.rows)
+    J = -assembled(line._replace(bits=line.bits & ~PLANAR), sea, ends, st, np.zeros_like(st.r), 0.0, soft)[0]
     across = np.zeros((5 * (N + 1), 2 * (N + 1)))
     for i in range(N + 1):
         across[5 * i + 1 : 5 * i + 4, 2 * i], across[5 * i + 4, 2 * i + 1] = n, 1.0

@@ -31,7 +31,6 @@ LINES: dict[str, Any] = network_scene(
 
 SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
 TORQUE = {SECTION + "tension_torque": 1e-3}
-SWIVEL = {"cable.attachments": [{"kind": "swivel", "at": 5}], END + "normal": [0, 1, 0]}
 BALL: dict[str, Any] = {"obstacles": {"ball": {"kind": "sphere", "at": [4, 0, -9], "radius": 1}}}
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
@@ -43,20 +42,13 @@ TABLE_BESIDE_TWO = {
 }
 LOCKS: dict[str, Any] = TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}
 SLIPS: dict[str, Any] = {SECTION + "bending_slip": [{"stiffness": 20, "moment": 1}]}
-CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
 ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
-SHAPED = {
-    "points.b": {"body": "buoy", "place": [0, 0, 0]},
-    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0],
-                    "shape": {"kind": "sphere", "radius": 0.3}},
-}  # fmt: skip
 OTHER_LINE = {"start": "a", "end": "b", "sections": [{"length": 9.5, "mass": 1, "diameter": 0.02}]}
 TWO_LINES = {"lines.two": OTHER_LINE, "contact": {}}
-PAID_LINE = {ONE + "connections.start.payout": {"rate": 0.1, "ramp": 1.0}}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {

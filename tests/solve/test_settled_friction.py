@@ -17,6 +17,7 @@ from hybrid.solve.stepper import LineFailed
 from tests.scenes import cable_scene, network_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 MU, WEIGHT, EA = 0.8, 1000.0, 6.0e8
 NEGLECTED = {"kind": "equilibrium", "friction": "neglected"}
 
@@ -85,6 +86,15 @@ def test_compression_that_friction_holds_is_told_and_does_not_stop_the_run() -> 
     told = [event for event in result.events if event.kind == "slack"]
     assert told and "friction holds it on the seabed" in told[0].text
     assert -MU * WEIGHT * 5.0 < result.tension.min() < 0.0
+
+
+@pytest.mark.parametrize(("friction", "bending"), [(0.8, "null"), (0.3, "null"), (0.8, "2.0e+4")])
+def test_a_chain_finds_its_settled_friction(friction: float, bending: str) -> None:
+    """The chain for which 0.5.0 found none; what lies beside the anchor bears its weight."""
+    settings = ["initial={kind: equilibrium, friction: settled}", f"environment.seabed.friction={friction}"]
+    settings.append(f"cable.sections[0].bending_stiffness={bending}")
+    result = hybrid.static(hybrid.load_scene(DEFECTS / "chain_friction_settled.yaml", settings))
+    assert np.ravel(result["contact_force"])[1:20] == pytest.approx(1203.0, rel=0.01)  # N/m
 
 
 def with_a_limit(**changes: Any) -> dict[str, Any]:
