@@ -107,29 +107,6 @@ RESULTS = [
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("model", ["catenary", "rod"])
-def test_one_line_is_the_cable(model: str) -> None:
-    """A scene with `cable` and `ends` is that network, by its own keys and results."""
-    sections = [SECTION | {"length": 120.0}]
-    points = {"low": {"position": [0, 0, -60.0]}, "top": {"position": [90, 0, -1.0], "motion": HEAVE}}
-    lines = {"a": {"start": "low", "end": "top", "model": model, "mesh": {"cells": 12}, "sections": sections}}
-    ends = {x: {"kind": "pinned"} | point for x, point in zip(("start", "end"), points.values(), strict=True)}
-    same = {"environment": water(True, True)} | OUTPUT
-    cable = {"cable": {"sections": sections}, "ends": ends, "model": model, "mesh": {"cells": 12}} | same
-    cable |= {"initial": "equilibrium"}
-    of_line = ["drag.normal", "mass", "length"]
-    both = []
-    for tables, of, place, end in (
-        (cable, "", "cable.", "ends.end."), ({"points": points, "lines": lines} | same, "a/", "lines.a.", "points.top."),
-    ):  # fmt: skip
-        keys = [f"{end}motion.heave.amplitude", *(f"{place}sections[0].{x}" for x in of_line)]
-        both.append(by_tangents(*asked_of(tables, [x.format(of) for x in OF], keys)))
-    one, several = both
-    np.testing.assert_array_equal(one.values, several.values)
-    np.testing.assert_allclose(one.derivatives, several.derivatives, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("waves", [False, True])
 @pytest.mark.parametrize("model", ["catenary", "rod"])
 def test_lines_at_a_point(model: str, waves: bool, monkeypatch: pytest.MonkeyPatch) -> None:

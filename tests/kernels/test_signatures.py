@@ -10,16 +10,21 @@ import subprocess
 import sys
 from importlib import import_module
 from inspect import signature
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
+import numpy as np
 import pytest
 from numba import types
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
+from numpy.typing import NDArray
 
 from hybrid.kernels.machine import compiler
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import NamedNumbers, key_of, reader
+from hybrid.kernels.state.state import Floats
 
 # No other process compiles beside it, of which this one would read nothing.  Garbage, of which numba leaves much, is not
 # looked for.
@@ -138,3 +143,121 @@ def test_functions_of_users_are_compiled_as_ever() -> None:
 
     assert list(numba.njit(squares)(4)) == [0, 1, 4, 9]
     assert numba.jit(forceobj=True, looplift=False)(count)("line") == {"line": 4}
+
+
+# --- The table of addresses that a kernel gets its arguments by ---
+
+
+class Pair(NamedTuple):
+    a: Floats
+    b: Floats
+
+
+class Example(NamedTuple):
+    pair: Pair
+
+
+def test_what_was_bound_before_a_failure_is_bound_anew() -> None:
+    """Nothing is bound where a value fails half-way; what was there before can be bound again."""
+    good = Pair(np.zeros(2), np.ones(2))
+    table = Table(Example(good))
+    numbers = table.numbers.copy()
+    with pytest.raises(TypeError, match="contiguous"):
+        table.bind(pair=Pair(np.zeros(3), np.ones(4)[::2]))
+    table.bind(pair=good)
+    assert np.array_equal(table.numbers, numbers)
+
+
+def test_a_function_that_makes_the_example_is_called_once() -> None:
+    """Tables of one kernel, of which a run makes tens, do not each find out what it takes."""
+    made = []
+
+    def blank() -> Example:
+        made.append(Example(Pair(np.zeros(2), np.ones(2))))
+        return made[-1]
+
+    one, other = Table(blank), Table(blank, np.zeros(4, np.int64))
+    assert len(made) == 1 and np.array_equal(one.numbers, other.numbers) and one.numbers is not other.numbers
+    one.bind(pair=Pair(np.zeros(3), np.ones(3)))
+    assert np.array_equal(other.numbers, Table(made[0]).numbers)
+    with pytest.raises(TypeError, match="contiguous"):
+        other.bind(pair=Pair(np.zeros(3), np.ones(4)[::2]))
+
+
+# --- Numbers with names: the same in Python and in kernels, and nothing else in their place ---
+
+
+class Times(NamedNumbers):
+    now: float
+    step: float
+
+
+class Steps(NamedNumbers, number=np.int64):
+    taken: int
+    wasted: int
+
+
+class Job(NamedTuple):
+    times: Times
+    more: NDArray[np.float64]
+    steps: Steps
+
+
+read = reader(Job(Times(), np.zeros(1), Steps()))
+
+
+@inner
+def go_on(times, steps):
+    times.now += times.step
+    steps.taken += 1
+
+
+@kernel
+def take(table, times):
+    job = read(table)
+    for _ in range(3):
+        go_on(job.times, job.steps)
+    go_on(times, job.steps)
+    job.steps.wasted = int(job.more[0])
+    for k in range(job.times.plain.shape[0]):
+        times.plain[k] += 0.5 * job.times.plain[k]
+    return job.times.now
+
+
+def test_kernels_and_python_see_the_same_numbers() -> None:
+    times, steps, others = Times(now=1.0, step=0.5), Steps(taken=5), Times(step=2.0)
+    table = Table(Job(times, np.array([7.0]), steps))
+    assert take(table.numbers, others) == 2.5
+    assert times.plain.tolist() == [2.5, 0.5] and others.plain.tolist() == [3.25, 2.25]
+    assert (steps.taken, steps.wasted) == (9, 7) and steps.plain.dtype == np.int64
+
+
+def test_numbers_of_one_class_are_not_those_of_another() -> None:
+    table = Table(Job(Times(), np.zeros(1), Steps()))
+    for wrong in (np.zeros(2), Steps()):
+        with pytest.raises(TypeError, match="times"):
+            table.bind(times=wrong)
+    with pytest.raises(TypeError, match="Times: shape"):
+        key_of(Times()[:1])
+    with pytest.raises(ValueError, match="expected 2 numbers of Times"):
+        Times.of(np.zeros(3))
+    assert Times.of(np.array([3.0, 4.0])).step == 4.0
+
+
+def test_names_are_those_of_the_class_and_of_nothing_else() -> None:
+    with pytest.raises(TypeError, match="Times has no later"):
+        Times(later=1.0)
+    with pytest.raises(TypeError, match=r"Wrong\.flags"):
+        type("Wrong", (NamedNumbers,), {"__annotations__": {"flags": "float"}})
+
+
+def test_packed_numbers_keep_their_names() -> None:
+    class Parts(NamedTuple):
+        values: NDArray[np.float64]
+        times: Times
+
+    packed = Packed(lambda n: Parts(np.zeros(n), Times()))
+    for made in (packed(4), Room(packed, 6).view(4)):
+        assert isinstance(made.times, Times)
+        made.times.step = 3.0
+        assert made.times.plain.tolist() == [0.0, 3.0] and made.values.size == 4

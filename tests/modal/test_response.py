@@ -14,7 +14,7 @@ from hybrid.cli.commands import app
 from hybrid.linear.response_results import LineResponse, Response, across, along, of_few, phases_of, size_deviation
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
 from hybrid.statistics.fatigue import damage
-from tests.scenes import cable_scene, clamped_at, line_between, pinned_at
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 T_N = {"kind": "T-N", "log_a": 3.0, "m": 3.0}
 
@@ -230,18 +230,13 @@ def test_waves_of_many_directions_as_in_time(tmp_path):
     assert here[:, 1].min() > 0.3 * here[:, 0].min()
 
 
-def test_one_line_of_a_system_is_the_cable():
-    """In a sea; and turned about the vertical with its waves."""
-    one = hybrid.response(hung(STORM))
-    tables = hung(STORM)
-    line = line_between("a", "b", tables["cable"]["sections"], model="catenary", mesh=60)
-    points = {"a": {"kind": "fixed", "position": [0, 0, -65]}, "b": {"kind": "fixed", "position": [6, 0, -5.15]}}
-    several = hybrid.response({"environment": tables["environment"], "points": points, "lines": {"l": line}})
-    turned = hung(STORM | {"direction": 120}, end=(0, 6, -5.15))
-    for other in (several.lines["l"], hybrid.response(turned).lines["cable"]):
-        for name in ("tension", "curvature"):
-            ours = one.lines["cable"].deviation(name)
-            np.testing.assert_allclose(other.deviation(name), ours, rtol=1e-6, atol=1e-7 * ours.max())
+def test_a_line_that_is_turned_with_its_waves_has_the_same_response():
+    one, other = (
+        hybrid.response(x).lines["cable"] for x in (hung(STORM), hung(STORM | {"direction": 120}, end=(0, 6, -5.15)))
+    )
+    for name in ("tension", "curvature"):
+        ours = one.deviation(name)
+        np.testing.assert_allclose(other.deviation(name), ours, rtol=1e-6, atol=1e-7 * ours.max())
 
 
 @pytest.mark.slow

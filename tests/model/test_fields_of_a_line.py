@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,11 @@ import pytest
 
 import hybrid
 import hybrid.model.payout
+from hybrid.kernels.state.report import FRICTION, SEABED
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Line
 from hybrid.model.build import Model, build, in_space, planar
 from hybrid.model.failure import without_hold
-from hybrid.model.line import line_on
+from hybrid.model.line import NO_INERTIA, line_on
 from hybrid.model.material import Material, material
 from hybrid.scene.read import one_line
 from tests.inside import OnlyLine
@@ -157,3 +159,41 @@ def test_release_and_the_plane_keep_every_field(change: Callable[[Model], Line])
     line = change(model)
     for name in ALONG_LINE:
         np.testing.assert_array_equal(getattr(line, name), getattr(model.line, name), err_msg=name)
+
+
+# --- Lines on base cells, compiled, are those of the material on nodes, whatever is rod ---
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+ROUND_OFF = 4e-16  # a product and a sum may be one operation
+
+
+@pytest.mark.parametrize("name", ["touchdown", "rov_tether", "laying", "irregular_sea"])
+def test_a_line_on_base_cells_is_that_of_the_material(name: str) -> None:
+    """Sections, floats, end bodies, waves, a seabed with friction; any base cells rod, any of their nodes there."""
+    scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model={kind: adaptive, curvature_error: 0.05}"])
+    model = build(one_line(scene))
+    assert model.layout is not None and model.on_base is not None
+    random = np.random.default_rng(1)
+    for _ in range(3):
+        rod = random.random(model.layout.rod.size) < 0.5
+        layout = model.layout._replace(rod=rod, here=random.random(model.layout.starts[-1] + 1) < 0.5)
+        more = model.line.bits & (SEABED | FRICTION)
+        same = line_on(model.cable, layout.nodes, layout.rod_cells, more, NO_INERTIA)
+        line = model.on_base.line(layout, same.bits)
+        for field, a, b in zip(line._fields, line, same, strict=True):
+            np.testing.assert_allclose(a, b, rtol=ROUND_OFF, atol=0.0, err_msg=field)
+        assert set(layout.base) <= set(layout.nodes.tolist()) and layout.nodes.size == line.s.size < model.line.s.size
+
+
+def test_an_end_that_is_let_go_holds_no_later_line() -> None:
+    """Zones that change after the release of a clamp make lines without it."""
+    scene = hybrid.load_scene(EXAMPLES / "s_tether.yaml")
+    data = scene.model_dump(mode="json", exclude_none=True)
+    data["ends"]["end"] = {"kind": "clamped", "position": [20, 0, -30], "tangent": [0, 0, -1]}
+    model = build(one_line(hybrid.validate_scene(data | {"model": "adaptive"})))
+    assert model.layout is not None and model.on_base is not None
+    assert model.on_base.line(model.layout, model.line.bits).element[-1] == 1
+    free = without_hold(model, 1, 0.0)
+    assert free.on_base is not None
+    line = free.on_base.line(model.layout, free.line.bits)
+    assert line.element[-1] == 0 and not line.kb[-1].any() and line.element[1:-1].all()

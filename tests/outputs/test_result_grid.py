@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 from hybrid.model.mesh import Zone
 from hybrid.outputs import observed_states
 from hybrid.outputs.joined_lines import JoinedGrid
-from hybrid.outputs.observed_states import Grid
+from hybrid.outputs.observed_states import Grid, means_beside
 
 Floats = np.ndarray
 
@@ -106,3 +106,27 @@ def test_grids_of_many_lines_are_made_at_once(monkeypatch: pytest.MonkeyPatch) -
         at_once = rows @ np.concatenate([np.append(v, [9.9] * gap) for v in values])[:, None]
         alone = np.concatenate([getattr(grid, name) @ v[:, None] for grid, v in zip(grids, values, strict=True)])
         np.testing.assert_array_equal(at_once, alone, err_msg=name)
+
+
+# --- Means over the lengths of output points: they keep the integral and miss nothing between the points ---
+
+
+@pytest.mark.parametrize("points", [5, 37, 400], ids=["coarser", "about as fine", "finer"])
+def test_the_integral_is_kept(points: int) -> None:
+    random = np.random.default_rng(points)
+    nodes = np.append(0.0, np.cumsum(random.uniform(0.5, 1.5, 40)))
+    values = np.zeros((3, nodes.size))
+    values[:, 17:19] = random.uniform(1.0, 2.0, (3, 2))
+    s = np.linspace(0.0, nodes[-1], points)
+    found = means_beside(s, nodes, values)
+    edges = np.concatenate([[0.0], 0.5 * (s[1:] + s[:-1]), [nodes[-1]]])
+    integral = (0.5 * np.diff(nodes) * (values[:, 1:] + values[:, :-1])).sum(axis=1)
+    np.testing.assert_allclose((found * np.diff(edges)[:, None]).sum(axis=0), integral, rtol=1e-13)
+    assert (found >= -1e-12).all() and (found.max(axis=0) > 0.0).all()
+    if points == 400:
+        np.testing.assert_allclose(found[:, 0], np.interp(s, nodes, values[0]), atol=0.1)
+
+
+def test_what_is_linear_stays_so_inside() -> None:
+    nodes, s = np.linspace(0.0, 7.0, 15), np.linspace(1.0, 6.0, 11)
+    np.testing.assert_allclose(means_beside(s, nodes, 2.0 * nodes[None])[:, 0], 2.0 * s, rtol=1e-13)

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from problems import order
 
 import hybrid
 from hybrid.errors import ResultError
-from tests.scenes import cable_scene, clamped_at, pinned_at
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene, pinned_at
 
 G, MASS, CLUMP = 9.81, 2.0, 5.0  # m/s2, kg/m, kg
 AT, LENGTH = 4.1, 10.0  # m
@@ -181,3 +182,187 @@ def test_tension_in_a_zone_of_one_cell_is_linear() -> None:
     data["cable"] = {"sections": [{"length": LENGTH, "mass": MASS, "axial_stiffness": 1e6, "bending_stiffness": 1.0}]}
     found = hybrid.static(hybrid.validate_scene(data))
     assert found.tension[0] == pytest.approx(MASS * G * (LENGTH - found.s), abs=1e-6 * MASS * G * LENGTH)
+
+
+# --- Torque along a line in equilibrium: that of the moments at its nodes, also where output points lie on a seam or
+# clamp ---
+
+SECTION = {"length": 10, "mass": 3, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 200}
+
+
+def hanging(sections: list[dict[str, Any]], attachments: list[dict[str, Any]]) -> hybrid.Result:
+    """A rod with a round section between two pinned ends in a current that turns with depth: nothing twists it."""
+    current = [{"z": -6, "velocity": [0.2, -1.0, 0]}, {"z": 0, "velocity": [0.3, 1.2, 0]}]
+    scene = cable_scene(
+        [x | {"drag": {"normal": 1.2}} for x in sections], pinned_at(0, 0, 0), pinned_at(6, 1, -1),
+        attachments=attachments, fluid={"density": 1025, "current": current}, model="rod", mesh=50,
+        output={"points": 201}
+    )  # fmt: skip
+    return hybrid.static(hybrid.validate_scene(scene))
+
+
+@pytest.mark.parametrize(
+    ("sections", "attachments"),
+    [
+        ([SECTION], [{"kind": "clump", "at": 4, "mass": 10}]),
+        ([SECTION], [{"kind": "modules", "range": [4, 7], "buoyancy": 30}]),
+        ([SECTION | {"length": 4}, SECTION | {"length": 6, "bending_stiffness": 800}], []),
+    ],
+    ids=["clump", "modules", "change of section"],
+)
+def test_no_torque_where_nothing_twists(sections: list[dict[str, Any]], attachments: list[dict[str, Any]]) -> None:
+    result = hanging(sections, attachments)
+    bending = float(result.bending_moment.max())
+    assert bending > 10.0
+    assert np.abs(result.torque).max() < 1e-8 * bending
+    assert np.abs(result.right.torque).max() < 1e-8 * bending
+
+
+def test_torque_at_clamps_is_that_of_their_moments() -> None:
+    """A twisted line on a slope, in cells too long for its bend at the clamp: torque had the wrong sign there."""
+    section = {
+        "length": 130, "mass": 10, "diameter": 0.05, "axial_stiffness": 5e6, "bending_stiffness": 800,
+        "torsional_stiffness": 600,
+    }  # fmt: skip
+    tangents = np.array([1.0, 0.0, 0.0]), np.array([0.3, 0.0, 1.0]) / np.hypot(0.3, 1.0)
+    start = {"kind": "clamped", "position": [-10, 0, -40], "tangent": [1, 0, 0], "normal": [0, 0, 1]}
+    end = {"kind": "clamped", "position": [80, 0, 2], "tangent": [0.3, 0, 1], "normal": [1, 0, 0], "turns": 1.5}
+    scene = cable_scene(
+        section, start, end, fluid={"density": 1025, "surface": 0},
+        seabed={"z": -40, "slope": [0.1, 0], "stiffness": 1e4}, model="rod", mesh=65, output={"points": 131}
+    )  # fmt: skip
+    result = hybrid.static(hybrid.validate_scene(scene))
+    torque, moments = result.torque[-1], (result.moment_start[-1], result.moment_end[-1])
+    assert torque[0] == pytest.approx(-moments[0] @ tangents[0], rel=1e-9)
+    assert torque[-1] == pytest.approx(moments[1] @ tangents[1], rel=1e-9)
+    assert torque == pytest.approx(np.median(torque), rel=0.04)
+    bending = np.linalg.norm(moments[0] - (moments[0] @ tangents[0]) * tangents[0])
+    assert result.bending_moment[-1, 0] == pytest.approx(bending, rel=1e-9)
+
+
+# --- The curvature of outputs between nodes, where a line bends to one side before them and to the other side after
+# them ---
+
+SPAN = 20.0
+
+
+def beam(cells: int, dimension: int) -> hybrid.Result:
+    """A heavy rod clamped at both ends, level: it bends upwards in the middle and downwards beside both clamps."""
+    section = {
+        "length": SPAN,
+        "mass": 2.0,
+        "bending_stiffness": 2e4,
+        "axial_stiffness": 1e8,
+        "torsional_stiffness": 1e4,
+    }
+    held = {"kind": "clamped", "tangent": [1, 0, 0]}
+    what: dict[str, Any] = cable_scene(
+        section, held | {"position": [0, 0, 0]}, held | {"position": [19.995, 0, 0]}, model="rod", mesh=cells,
+        output={"points": 1601, "errors": False}
+    )  # fmt: skip
+    return hybrid.static(what | {"dimension": dimension})
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_curvature_is_interpolated_through_an_inflection(dimension: int) -> None:
+    """Of second order there as elsewhere; its size alone, interpolated, would be of first order and never reach zero."""
+    fine = beam(1600, dimension)
+    k = fine.curvature[-1]
+    inside = (fine.s > 2.0) & (fine.s < 8.0)
+    assert k[inside].min() < 2e-3 * k.max()
+    errors = []
+    for cells in (17, 34, 68):
+        found = beam(cells, dimension).curvature[-1]
+        errors.append(np.abs(found - k)[inside].max() / k.max())
+    assert order(errors)[-1] > 1.8 and errors[-1] < 2e-3, errors
+
+
+def test_extremes_have_the_curvature_of_the_moment_and_of_the_unloaded_line_as_vectors() -> None:
+    """0.3/m without load, and across them 0.4/m of a given moment make 0.5/m, behind the seam 0.2/m 0.36/m."""
+    section = {"mass": 0.1, "axial_stiffness": 1e6, "torsional_stiffness": 1e3, "intrinsic_curvature": [0.3, 0.0, 0.0]}
+    found = hybrid.run(
+        {
+            "environment": {"gravity": 0.0},
+            "cable": {"sections": [section | {"length": 0.1, "bending_stiffness": EI} for EI in (100.0, 200.0)]},
+            "ends": {
+                "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]},
+                "end": {"kind": "free", "moment": [0.0, 0.0, 40.0]},
+            },
+            "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}, "time": {"duration": 0.02, "step": 0.01},
+            "output": {"every": 0.01, "points": 3},
+        }
+    )  # fmt: skip
+    high, shown = np.asarray(found["envelope"]["curvature_max"]), found.curvature[0]
+    assert high == pytest.approx(np.repeat([0.5, np.hypot(0.3, 0.2)], 11), rel=2e-4)
+    assert high[[0, 10, -1]] == pytest.approx(shown, rel=1e-12)
+    assert high[11] == pytest.approx(found["right/curvature"][0, 0], rel=1e-12)
+
+
+# --- Tension beside point loads, at ends of modules and at ends one cell away from a load: nothing is taken across a
+# kink ---
+
+HEAVY = {"length": 100, "mass": 2.0, "axial_stiffness": 1e7}
+
+
+def hung_level(span: float, depth: float = 0.0, **cable: Any) -> dict[str, Any]:
+    """A catenary in air between two points of one height."""
+    pinned = {name: {"kind": "pinned", "position": [x, 0, depth]} for name, x in (("start", 0.0), ("end", span))}
+    return {"cable": cable, "ends": pinned, "initial": "equilibrium", "model": "catenary"}
+
+
+def test_the_largest_tension_is_that_on_each_side_of_modules() -> None:
+    """T^2 = H^2 + V^2 at s = 45 m, where lifting modules begin: the largest of the line."""
+    section = {"length": 100, "mass": 20, "diameter": 0.05, "axial_stiffness": 1e8, "max_tension": 11600}
+    scene = hung_level(
+        20.0, -60.0, sections=[section], attachments=[{"kind": "modules", "range": [45, 55], "buoyancy": 2500}]
+    )
+    result = hybrid.static(scene | {"environment": {"fluid": {"density": 1025}}})
+    horizontal, vertical = np.abs(result["reaction_start"].reshape(3)[[0, 2]])
+    weight = (20.0 - 1025 * np.pi / 4 * 0.05**2) * 9.81
+    assert result["envelope/tension_max"].max() == pytest.approx(np.hypot(horizontal, vertical + 45 * weight), rel=1e-4)
+    assert "tension above limit" in {event.kind for event in result.events}
+
+
+@pytest.mark.parametrize("at", [1.0, 2.0])
+def test_the_tension_of_an_end_beside_a_load(at: float) -> None:
+    """Cells of 1 m: the load is one cell from the end, or two; the reaction knows the tension."""
+    clumps = [{"kind": "clump", "at": x, "mass": 1500} for x in (at, 100.0 - at)]
+    result = hybrid.static(hung_level(99.5, sections=[HEAVY], attachments=clumps) | {"mesh": {"cells": 100}})
+    tension = np.ravel(result.tension)
+    for k, reaction in ((0, "reaction_start"), (-1, "reaction_end")):
+        assert tension[k] == pytest.approx(np.linalg.norm(result[reaction]), rel=2e-3)
+    assert result["envelope/tension_max"].max() == pytest.approx(tension.max(), rel=2e-3)
+
+
+def test_the_force_of_a_line_on_a_free_point_beside_a_load() -> None:
+    """What two lines pull balances the weight of the point between them."""
+    lines = {
+        "one": line_between("a", "k", HEAVY, attachments=[{"kind": "clump", "at": 99, "mass": 1500}]),
+        "two": line_between("k", "b", HEAVY),
+    }
+    result = hybrid.static({
+        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [198.5, 0, 0]},
+                   "k": {"kind": "free", "initial_guess": [99.5, 0, -3], "mass": 10}},
+        "lines": {name: line | {"mesh": {"cells": 100}} for name, line in lines.items()},
+    })  # fmt: skip
+    pulled = result.lines["one"]["reaction_end"] + result.lines["two"]["reaction_start"]
+    assert pulled.reshape(3) == pytest.approx([0.0, 0.0, -10 * 9.81], abs=0.003 * 5e4)
+
+
+def test_the_largest_tension_at_an_offset_beside_a_load() -> None:
+    """The clump is one cell of 10 m from the upper end, where the tension is largest: the pull there."""
+    line = {"start": "a", "end": "k", "sections": [HEAVY], "mesh": {"cells": 10}}
+    line["attachments"] = [{"kind": "clump", "at": 10, "mass": 150}]
+    scene = network_scene(
+        {"a": {"position": [0, 0, 0]}, "k": {"position": [80, 0, -30]}}, {"one": line | {"model": "catenary"}}
+    )
+    found = hybrid.offsets(scene, "point:k", [0.0])
+    pull = np.linalg.norm(hybrid.static(scene).lines["one"]["reaction_start"])
+    assert found.tension["one"][0] == pytest.approx(pull, rel=2e-3)
+
+
+@pytest.mark.parametrize("asked", [{"line_tension": "1%"}, {"curvature": "5%"}])
+def test_what_is_asked_along_a_cable_without_bending_stiffness(asked: dict[str, str]) -> None:
+    result = hybrid.static(hung_level(80.0, sections=[HEAVY]) | {"accuracy": asked})
+    assert not [event for event in result.events if event.kind == "accuracy missed"]
+    assert len(result.mesh[0].s) < 2000

@@ -209,26 +209,6 @@ def as_network(tables: Any) -> hybrid.Scene:
     return in_full(hybrid.validate_scene(tables))
 
 
-def same_planes(network: Any, cable: Any, part: float = 1e-9) -> None:
-    """The only line of a network moves as a cable."""
-    (line,) = network.lines.values()
-    for key in ("position", "velocity", "tension", "energy/kinetic", "work/end", "envelope/tension_max"):
-        scale = np.nanmax(np.abs(cable[key]))
-        assert np.nanmax(np.abs(line[key] - cable[key])) <= part * scale, key
-
-
-@pytest.mark.parametrize("dimension", [None, 2, 3])
-def test_a_line_in_a_plane_is_the_cable(dimension: int | None, flat: list[list[int]]) -> None:
-    """In a vertical plane of any direction; where nothing is said, in its plane."""
-    network = hybrid.run(as_network(swinging(0.8, 0.0, dimension)))
-    assert flat == [[] if dimension == 3 else [0]]
-    cable = hybrid.run(swinging(0.8, 0.0, 3))
-    assert flat[1:] == [[]]
-    same_planes(network, cable)
-    (line,) = network.lines.values()
-    np.testing.assert_array_equal(line["steps/iterations"], cable["steps/iterations"])
-
-
 # What changes cells or lengths of a line in motion: a third of them change within these scenes.
 CHANGES: dict[str, Tables] = {
     "zones that move": {"model": {"kind": "adaptive", "always_move": True, "hold_time": 0.1}},

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import test_payout_bending as bending
 import test_payout_cells as cells
-import test_payout_damping as damping
 import test_payout_laws as laws
 import test_payout_layers as layers
 import test_payout_zones as zones
@@ -94,7 +93,7 @@ KICKS: dict[str, tuple[Tables, float]] = {
     "clamp that turns": (turned(), 1e-3),
     **{f"cells that follow {x}": (following(*x[:3]), x[3])  # every two of stiffness, direction and clamp meet
        for x in ((2e4, 0.8, False, 6e-4), (500.0, 0.8, True, 6e-4), (500.0, -0.8, False, 6e-4), (2e4, -0.8, True, 1e-3))},
-    **{f"damped {name}": (damping.damped(lasting(x, 13.5)), 6e-4) for name, x in (
+    **{f"damped {name}": (layers.damped(lasting(x, 13.5)), 6e-4) for name, x in (
         ("catenary", sagging("catenary", 2e6)), ("rod", MODELS["rod"]), ("clamp", MODELS["clamp"]))},
     **{name: (lasting(x, 14.0), 2e-3) for name, x in LAWS.items()},
     "vortices": (lasting(LAWS["vortices"], 14.0, mesh={"cells": 80}), 2e-3),  # 40 are too few for how it vibrates: 1e-2
@@ -116,8 +115,8 @@ def test_a_node_that_enters_or_leaves_does_not_kick(name: str) -> None:
 ENERGY: dict[str, tuple[Tables, float, float]] = {
     **{name: (x, 1e-4, 3.0) for name, x in MODELS.items()},
     "table and stiffener": (bending.bent(), 3e-4, 2.5), "cells that follow": (follows(), 5e-5, 3.0),
-    **{f"damped {rate}": (damping.damped(damping.rod(rate)), 1e-4, 3.0) for rate in (0.8, -0.8)},
-    "damped, a winch": (damping.damped(with_winch(sagging("rod", 2e6, 2e4, duration=8.0))), 5e-4, 3.0),
+    **{f"damped {rate}": (layers.damped(layers.rod(rate)), 1e-4, 3.0) for rate in (0.8, -0.8)},
+    "damped, a winch": (layers.damped(with_winch(sagging("rod", 2e6, 2e4, duration=8.0))), 5e-4, 3.0),
     **{name: (x, 1e-3, 2.0) for name, x in LAWS.items()},
     **{f"{name} {rate}, clamped: {clamp}": (layers.paid(name, rate, clamp=clamp), 1e-3, 2.0) for name, rate, clamp in (
         ("layers", 0.8, True), ("layers", -0.8, True), ("layers", 0.8, False), ("layers", -0.8, False),
@@ -181,7 +180,7 @@ ALIKE: dict[str, tuple[Tables, list[tuple[Tables, float]], tuple[str, ...]]] = {
         ("position", "reaction_end", "moment", "work/hysteresis"))
        for name in ("layers", "damped") for clamp in (True, False)},
     "damped, a rate of zero": (
-        without_payout(scene := damping.damped(sagging("rod", 2e6, 2e4, 0.0, duration=2.0))), [(scene, 1e-12)],
+        without_payout(scene := layers.damped(sagging("rod", 2e6, 2e4, 0.0, duration=2.0))), [(scene, 1e-12)],
         ("position", "reaction_end", "work/stiffness_damping")),
 }  # fmt: skip
 
@@ -214,7 +213,7 @@ def reeled() -> Tables:
 
 # Parts of the largest value by which forces and works may differ.
 MIRRORED: dict[str, tuple[Tables, float]] = {
-    "table and stiffener": (bending.bent(), 1e-7), "damped": (damping.damped(damping.rod(0.8)), 1e-6),
+    "table and stiffener": (bending.bent(), 1e-7), "damped": (layers.damped(layers.rod(0.8)), 1e-6),
     "torque": (LAWS["torque"], 1e-6), "polyester": (LAWS["polyester"], 1e-6), "reel of rope": (reeled(), 1e-7),
     **{f"{name}, clamped: {clamp}": (layers.paid(name, clamp=clamp), 1e-6) for name, clamp in (
         ("layers", True), ("layers", False), ("tension", True), ("damped", True))},
@@ -271,10 +270,10 @@ REFUSED: dict[str, tuple[Tables, tuple[str, ...]]] = {
     "slip": (on_the_reel(layers.paid(), bending_slip=layers.LAYERS[:1]), (LAYERED, f"{REEL}.bending_slip")),
     "tension": (on_the_reel(layers.paid(), stiffness_per_tension=2.0), (LAYERED, f"{REEL}.stiffness_per_tension")),
     "first loading": (on_the_reel(layers.paid("table"), first_loading=False), (LAYERED,)),
-    "damped table": (damping.damped(on_the_reel(sagging("catenary"))) | {"cable": {"sections": [
+    "damped table": (layers.damped(on_the_reel(sagging("catenary"))) | {"cable": {"sections": [
         {"length": 100.0, "mass": 5.0, "tension_strain": [[0, 0], [0.01, 1e4]], "damping": {"stiffness": 0.05}}]}},
         ("damping.stiffness",)),
-    "damping": (damping.damped(on_the_reel(sagging("catenary", 2e6))), ("the damping.stiffness of the section at the winch",)),
+    "damping": (layers.damped(on_the_reel(sagging("catenary", 2e6))), ("the damping.stiffness of the section at the winch",)),
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from test_payout_zones import touching
 
 import hybrid
 from hybrid.errors import SceneError
-from tests.combinations.pairs import as_network, scene_of
+from tests.combinations.pairs import as_network, scene_of, seen_by
 from tests.scenes import line_between, network_scene
 
 G = 9.81
@@ -76,15 +76,9 @@ def test_a_load_goes_down_as_line_is_paid_out() -> None:
 def test_turned_it_is_the_same() -> None:
     """The scene rotated about the vertical."""
     c, s = np.cos(0.7), np.sin(0.7)
-    M, turned = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), crane()
-    for point in turned["points"].values():
-        for key in ("position", "initial_guess"):
-            if key in point:
-                point[key] = (M @ point[key]).tolist()
-    bar = turned["bodies"]["bar"]
-    bar["initial_guess"] = (M @ bar["initial_guess"]).tolist()
-    bar["initial_rotation"] = [0, 0, np.degrees(0.7)]
-    turned["environment"]["fluid"]["current"] = (M @ turned["environment"]["fluid"]["current"]).tolist()
+    M = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned = seen_by(M, crane())
+    turned["bodies"]["bar"]["initial_rotation"] = [0, 0, np.degrees(0.7)]
     one, other = raised()[0], hybrid.run(turned)
     for name in ("wire", "tug"):
         end = -1 if name == "wire" else 0

@@ -1,4 +1,4 @@
-"""Ends of one cable that are clamped by an angular spring: as the same line in a scene of several, refusals."""
+"""Ends of one cable that are clamped by an angular spring: how far they turn, zones that move, winches, refusals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import build
 from hybrid.model.line import ABOUT_CHORDS, line_on
 from hybrid.scene.read import one_line
-from tests.scenes import cable_scene, line_between
+from tests.scenes import cable_scene
 
 LENGTH, CELLS = 30.0, 20
 SECTION = {
@@ -44,26 +44,12 @@ def one(start: dict[str, Any], end: dict[str, Any], **more: Any) -> dict[str, An
     )
 
 
-def as_a_system(start: dict[str, Any], end: dict[str, Any]) -> dict[str, Any]:
-    """The same line in a scene of several."""
-    points = {"a": {"position": A}, "b": {"position": B, "motion": MOTION}}
-    line = line_between("a", "b", SECTION, connections={"start": start, "end": end}, model="rod", mesh=CELLS)
-    return COMMON | {"points": points, "lines": {"line": line}}
-
-
-@pytest.mark.long
-def test_a_cable_on_springs_is_the_line_on_springs_of_several() -> None:
-    """Places, moments and curvature, at rest and in motion; the springs turn, and are not those of a rigid clamp."""
-    scene = one(START, END)
-    at_rest, rigid = hybrid.static(scene), hybrid.static(one(START | {"bend_stiffness": None}, END))
-    whole, system = hybrid.run(scene), hybrid.run(as_a_system(START, END)).lines["line"]
+def test_springs_turn_by_their_moments() -> None:
+    """And are not those of a rigid clamp."""
+    at_rest, rigid = hybrid.static(one(START, END)), hybrid.static(one(START | {"bend_stiffness": None}, END))
     assert np.abs(at_rest["position"] - rigid["position"]).max() > 1e-3 * LENGTH
-    apart = np.abs(whole["position"] - system["position"]).max(axis=(1, 2))
-    assert apart[0] < 1e-9 * LENGTH and apart.max() < 10 * TOLERANCE * LENGTH
-    for name in ("curvature", "bending_moment", "torque"):
-        assert np.abs(whole[name] - system[name]).max() < 1e-6 * np.abs(whole[name]).max()
-    d = whole["position"][0, 1] - whole["position"][0, 0]
-    moment = whole["moment_start"][0]
+    d = at_rest["position"][0, 1] - at_rest["position"][0, 0]
+    moment = at_rest["moment_start"][0]
     across = moment - moment[0] * np.array([1.0, 0.0, 0.0])
     # the spring and half a cell in series turn from the clamp to the first chord
     half = 0.5 * LENGTH / CELLS

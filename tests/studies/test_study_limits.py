@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,18 @@ from bits import Stopping
 
 import hybrid
 from hybrid.cli.commands import main
+from hybrid.cli.console import Console
+from hybrid.cli.study_commands import _show
 from hybrid.errors import SceneError
-from hybrid.scene.study import Kept, study_from
+from hybrid.scene.study import Kept, read_study, study_from
+from hybrid.statistics.fatigue import YEAR, life_in_years
 from hybrid.statistics.moments import exceedance
 from hybrid.store.histories import history_of
+from hybrid.store.study_file import open_study, unmet_accuracy
 from hybrid.studies.cases import Cases, cases_of
-from hybrid.studies.study import _refuse_limits_not_there, _remove_cases
-from hybrid.studies.workers import Job, compute_batch
+from hybrid.studies.study import _created, _refuse_limits_not_there, _remove_cases
+from hybrid.studies.workers import Job, compute_batch, write_outcomes
+from hybrid.view.study_report import html
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 
@@ -200,3 +206,97 @@ def test_statistics_name_what_has_none(scene: Path) -> None:
     with pytest.raises(hybrid.ResultError, match=r"^'end_force_end': one value is too few"):
         t = float(result["steps/t"][3])
         result.statistics(["end_force_end"], times=(t, t))
+
+
+# --- The studies of examples/ are what they say: read whole, and one of them computed with short runs ---
+
+STUDIES = Path(__file__).parents[2] / "examples" / "studies"
+CASES = {"heave": 14, "launch_window": 42, "touchdown_fatigue": 6, "storm_seeds": 20, "fatigue_sensitivity": 192}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_examples_are_read(name: str) -> None:
+    assert len(cases_of(read_study(STUDIES / f"{name}.yaml")).rows) == CASES[name]
+
+
+def test_there_is_no_other_example() -> None:
+    studies = {file.stem for file in STUDIES.glob("*.yaml") if "\nscene:" in file.read_text(encoding="utf-8")}
+    assert studies == set(CASES)
+
+
+@pytest.mark.long
+def test_life_over_a_scatter_diagram(tmp_path: Path) -> None:
+    """Damage of each sea state at every place, times its part of the time, is the rate of the life."""
+    study = read_study(STUDIES / "touchdown_fatigue.yaml")
+    text = Path(study.scene).read_text(encoding="utf-8").replace("duration: 700, step: 0.1", "duration: 60, step: 0.25")
+    (tmp_path / "short.yaml").write_text(text.replace("cells: 80", "cells: 24"), encoding="utf-8")
+    kept = {"fatigue": study.collect["fatigue"].model_copy(update={"times": (20.0, 60.0)})}  # type: ignore[index]
+    short = study.model_copy(update={"scene": str(tmp_path / "short.yaml"), "collect": kept})
+    found = hybrid.study(short, tmp_path / "short.zarr", workers=1)
+    assert found["status"].values.tolist() == [1] * 6
+    assert found["part"].values.sum() == pytest.approx(1.0)
+    years = life_in_years(found["fatigue"].values, found["part"].values, 40.0)
+    rate = (found["part"].values[:, None] * found["fatigue"].values).sum(axis=0) / 40.0
+    assert years == pytest.approx(1.0 / (rate * YEAR))
+    damage = found["fatigue"].values.max(axis=1)
+    assert np.all(np.diff(damage[:3]) > 0.0)  # higher waves do more
+
+
+# --- What a study says of the accuracy asked: how many cases missed it, or have it not verified, the worst, what to
+# do ---
+
+FIXED_SCENE = """
+environment: {fluid: {density: 1025}, seabed: {z: -41, stiffness: 1.0e+4, friction: 0.0}}
+cable: {sections: [{length: 60, mass: 8, diameter: 0.04, axial_stiffness: 1.0e+7, drag: {normal: 1.2}}]}
+ends:
+  start: {kind: pinned, position: [0, 0, -40]}
+  end: {kind: pinned, position: [35, 0, 0], motion: {heave: {amplitude: 1.0, period: 5.0}, ramp: 5}}
+initial: equilibrium
+accuracy: {position: 2 m, tension: 10%}
+model: catenary
+mesh: {cells: 16}
+time: {duration: 3, step: 0.1}
+"""
+VARY = {
+    "asked": {"key": "accuracy.position", "values": ["2 m", "50 mm", "5 mm", "20 mm", "2 m"]},
+    "mu": {"key": "environment.seabed.friction", "values": [0, 0, 0, 0, 0.5]},
+}
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of five cases: the first meets what is asked, three miss it, and of the last it is not verified."""
+    folder = tmp_path_factory.mktemp("accuracy")
+    (folder / "scene.yaml").write_text(FIXED_SCENE)
+    collect = {"force": {"quantity": "end_force_end"}}
+    asked = study_from({"scene": "scene.yaml", "vary": VARY, "combine": "zip", "collect": collect}, folder)
+    cases = cases_of(asked)
+    file = _created(folder / "study.zarr", asked, cases, asked.collect, "", len(cases.rows), ())
+    write_outcomes(file, 0, compute_batch(Job(cases.base, cases.keys, cases.rows, asked.collect, False)))
+    return file.path
+
+
+def test_which_cases_do_not_meet_it(table: Path) -> None:
+    found = open_study(table)
+    assert found["accuracy_verdict"].values[0] == "met" and found["accuracy_used"].values[0] < 1.0
+    missed, unknown = unmet_accuracy(found)
+    assert missed.verdict == "missed" and missed.cases == [1, 2, 3] and missed.done == 5
+    assert missed.worst == 2 and missed.used == found["accuracy_used"].values.max() > 4.0
+    assert "asked 0.005 m" in missed.text and "try: leave mesh" in missed.text
+    assert unknown.verdict == "not verified" and unknown.cases == [4] == [unknown.worst]
+    told = "the error of end forces is not known: it does not converge; try: shorter steps and cells"
+    assert unknown.text == told  # before `static friction neglected`
+    assert not unmet_accuracy(found.isel(case=[0])) and not unmet_accuracy(found.drop_vars("accuracy_verdict"))
+
+
+@pytest.mark.parametrize("as_json", [False, True], ids=["people", "programs"])
+def test_the_summary_and_the_page_say_so(table: Path, as_json: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    _show(Console(as_json, False), open_study(table), table, 1.0, None)
+    told = capsys.readouterr()
+    if as_json:
+        rows = [x for x in map(json.loads, told.out.splitlines()) if x["event"] == "accuracy"]
+        assert [(x["verdict"], x["worst"]) for x in rows] == [("missed", 2), ("not verified", 4)]
+        return
+    for text in ("3 of 5 cases missed the accuracy asked, case 2 most of all (", "leave mesh", "1 of 5 cases have the"):
+        assert text in told.err and text in html(table)
+    assert "accuracy_used" not in told.out

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from hybrid.scene.read import as_scene, one_line
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState
+from tests.combinations.pairs import seen_by
 from tests.scenes import cable_scene, line_between, network_scene
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
@@ -180,13 +183,28 @@ def pushed(**shape: Any) -> Tables:
     return tables | {"time": {"duration": 0.5, "step": 0.005}, "output": {"every": 0.05, "points": 21}}
 
 
-@pytest.fixture(scope="module")
-def fallen() -> Any:
-    return hybrid.run(pushed())
+def pushed_box() -> Tables:
+    """A box in place of the ball."""
+    tables = pushed()
+    box = {"kind": "box", "size": [0.9, 1.3, 0.8], "rounding": 0.15, "rotation": [10, 20, 5], "friction": 0.4}
+    tables["bodies"]["ball"] |= {"shape": box, "initial_guess": [4.2, 0.02, 0.9]}
+    return tables
 
 
-def test_work_of_lines_on_a_body_is_that_of_the_body_on_the_lines(fallen: Any) -> None:
+@cache
+def fell(make: Callable[[], Tables] = pushed) -> Any:
+    return hybrid.run(make())
+
+
+both_shapes = pytest.mark.parametrize(
+    "make", [pushed, pytest.param(pushed_box, marks=pytest.mark.long)], ids=["ball", "box"]
+)
+
+
+@both_shapes
+def test_work_of_lines_on_a_body_is_that_of_the_body_on_the_lines(make: Callable[[], Tables]) -> None:
     """Booked on both sides, by power here and by way there; the energy of the body is what is done on it."""
+    fallen = fell(make)
     done = fallen["bodies/ball/work/lines"]
     by_lines = sum(x["work/obstacles"] for x in fallen.lines.values())
     assert np.abs(done).max() > 1.0
@@ -199,35 +217,34 @@ def test_work_of_lines_on_a_body_is_that_of_the_body_on_the_lines(fallen: Any) -
     assert touches.any() and not touches.all()
     np.testing.assert_allclose(force, fallen["bodies/ball/force"], atol=1e-3 * np.abs(force).max())
     assert not any(x.kind in ("deep in an obstacle", "gains energy") for x in fallen.events)
+    assert np.abs(fallen["bodies/ball/rotation"] - fallen["bodies/ball/rotation"][0]).max() > 1.0
 
 
 def turns_with_its_scene(tables: Tables, fallen: Any, atol: float) -> None:
     """What a scene that is turned about the vertical has is turned; fallen: as it stands."""
     angle = np.radians(40.0)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    for point in tables["points"].values():
-        point["position"] = (turn @ point["position"]).tolist()
+    tables = seen_by(turn, tables)
     ball = tables["bodies"]["ball"]
-    ball["initial_guess"], ball["moment"] = (turn @ ball["initial_guess"]).tolist(), (turn @ ball["moment"]).tolist()
+    ball["moment"] = (turn @ ball["moment"]).tolist()
     ball["initial_rotation"][2] += 40.0
-    for line in tables["lines"].values():
-        line["initial"]["direction"] = (turn @ line["initial"]["direction"]).tolist()
     result = hybrid.run(tables)
     np.testing.assert_allclose(result["bodies/ball/position"], fallen["bodies/ball/position"] @ turn.T, atol=atol)
     for side, x in fallen.lines.items():
         np.testing.assert_allclose(result.lines[side].position, x.position @ turn.T, atol=atol)
 
 
-def test_a_turned_scene_moves_the_same(fallen: Any) -> None:
-    turns_with_its_scene(pushed(), fallen, 1e-9)
+@both_shapes
+def test_a_turned_scene_moves_the_same(make: Callable[[], Tables]) -> None:
+    turns_with_its_scene(make(), fell(make), 1e-9)
 
 
-def test_where_the_origin_of_a_body_is_changes_nothing(fallen: Any) -> None:
+def test_where_the_origin_of_a_body_is_changes_nothing() -> None:
     """Origin elsewhere in the body, its middle and its mass where they were: to what steps make of the way of another
 
     point, a hundred-thousandth of the way.
     """
-    tables, place = pushed(), (0.1, -0.2, 0.15)
+    tables, fallen, place = pushed(), fell(), (0.1, -0.2, 0.15)
     ball = tables["bodies"]["ball"]
     ball["shape"]["place"] = ball["centre"] = list(place)
     ball["initial_guess"] = np.subtract(ball["initial_guess"], turned((20, 10, 30), place)).tolist()
@@ -278,28 +295,6 @@ def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
         np.testing.assert_allclose(a.position, b.position, atol=1e-6)
         left = 3e-3 if kind == "box" else 1e-3  # N: Newton's method leaves more where curvature jumps at edges
         np.testing.assert_allclose(a.tension, b.tension, rtol=1e-6, atol=left)
-
-
-@pytest.mark.long
-def test_a_box_that_falls_on_lines(tmp_path: Path) -> None:
-    """Work of lines on it and of it on them, the scene turned, and a run that goes on, as of a ball."""
-    box = {"kind": "box", "size": [0.9, 1.3, 0.8], "rounding": 0.15, "rotation": [10, 20, 5], "friction": 0.4}
-
-    def tables(duration: float = 0.5) -> Tables:
-        found = pushed()
-        found["bodies"]["ball"] |= {"shape": box, "initial_guess": [4.2, 0.02, 0.9]}
-        return found | {"time": {"duration": duration, "step": 0.005}}
-
-    result = hybrid.run(tables())
-    done, by_lines = result["bodies/ball/work/lines"], sum(x["work/obstacles"] for x in result.lines.values())
-    assert np.abs(done).max() > 1.0
-    np.testing.assert_allclose(done, -by_lines, atol=0.02 * np.abs(done).max())
-    assert np.abs(result["bodies/ball/rotation"] - result["bodies/ball/rotation"][0]).max() > 1.0
-    assert not any(x.kind in ("deep in an obstacle", "gains energy") for x in result.events)
-    turns_with_its_scene(tables(), result, 1e-9)
-    hybrid.run(tables(0.25), tmp_path / "a.h5")
-    on = hybrid.resume(tmp_path / "a.h5", until=0.5)
-    assert np.array_equal(on["bodies/ball/position"], result["bodies/ball/position"])
 
 
 @pytest.mark.parametrize(

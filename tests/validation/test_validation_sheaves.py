@@ -14,7 +14,7 @@ import hybrid
 from hybrid.kernels.state.report import SPIN
 from tests.scenes import network_scene
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND
-from tests.validation.test_validation_moving_obstacles import ran, weights
+from tests.validation.test_validation_moving_obstacles import weights
 from tests.validation.thrown_lines import WIDTH, straight, throw
 
 Tables = dict[str, Any]
@@ -50,7 +50,7 @@ def crossed_legs(inertia: float, held: bool = True) -> Tables:
 
 @pytest.fixture(scope="module")
 def pulled() -> Any:
-    return ran(crossed_legs(0.02, held=False))
+    return hybrid.run(crossed_legs(0.02, held=False))
 
 
 def test_legs_that_touch_turn_a_sheave(pulled: Any) -> None:
@@ -66,13 +66,13 @@ def test_legs_that_touch_turn_a_sheave(pulled: Any) -> None:
 @pytest.mark.long
 def test_a_very_heavy_sheave_is_a_drum_that_stands() -> None:
     tables = crossed_legs(1e12)
-    heavy = ran(tables)
+    heavy = hybrid.run(tables)
     del tables["obstacles"]["drum"]["bearing"]
-    still = ran(tables)
+    still = hybrid.run(tables)
     assert still["self_contact"].max() > 10.0
     np.testing.assert_allclose(heavy.position, still.position, atol=1e-6)
     np.testing.assert_allclose(heavy["self_contact"], still["self_contact"], atol=1e-4 * still["self_contact"].max())
-    light = ran(crossed_legs(0.02))
+    light = hybrid.run(crossed_legs(0.02))
     print(f"\niterations: over a drum {still.steps.iterations.sum()}, a sheave {light.steps.iterations.sum()}")
     assert light.steps.iterations.sum() < 1.05 * still.steps.iterations.sum()  # derivatives are as exact
 
