@@ -20,7 +20,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -822,21 +822,13 @@ def solid_angle(a: Floats, b: Floats, c: Floats) -> float:
     return 2 * math.atan2(a @ np.cross(b, c), 1 + a @ b + b @ c + c @ a)
 
 
-def writhe(r: Floats) -> float:
-    """Writhe of a closed polygon r (n, 3): Gauss's integral, exactly (Klenin & Langowski, Biopolymers 54, 2000)."""
-    n, total = len(r), 0.0
-    for i in range(1, n):
-        a, b = r[i], r[(i + 1) % n]
-        for j in range(i - 1):
-            if i == n - 1 and j == 0:
-                continue
-            c, d = r[j], r[j + 1]
-            sides = [np.cross(p, q) for p, q in ((c - a, d - a), (d - a, d - b), (d - b, c - b), (c - b, c - a))]
-            sizes = [float(np.linalg.norm(p)) for p in sides]
-            if min(sizes) == 0.0:
-                continue
-            sides = [p / q for p, q in zip(sides, sizes, strict=True)]
-            pairs = zip(sides, sides[1:] + sides[:1], strict=True)
-            angles = [math.asin(float(np.clip(p @ q, -1, 1))) for p, q in pairs]
-            total += sum(angles) / (2 * math.pi) * math.copysign(1.0, float(np.cross(d - c, b - a) @ (c - a)))
+def writhe(r: Floats, closed: bool = True) -> float:
+    """Writhe of a polygon r (n, 3): Gauss's integral, exactly (Klenin & Langowski, Biopolymers 54, 2000)."""
+    total = 0.0
+    for (a, b), (c, d) in combinations(pairwise(np.vstack([r, r[: int(closed)]])), 2):
+        sides = np.cross([c - a, d - a, d - b, c - b], [d - a, d - b, c - b, c - a])
+        sizes = np.linalg.norm(sides, axis=1)[:, None]
+        if sizes.min() > 0.0:
+            angles = np.arcsin(np.clip(np.sum(sides / sizes * np.roll(sides / sizes, -1, axis=0), axis=1), -1, 1))
+            total += float(angles.sum() * np.sign(np.cross(d - c, b - a) @ (c - a))) / (2 * math.pi)
     return total

@@ -94,12 +94,6 @@ def test_who_asks_for_other_programs_is_told_where_they_are(call: Call, more: li
     assert not Path("sag.trade").exists()
 
 
-def test_a_scene_without_time_is_refused(call: Call) -> None:
-    Path("sag.yaml").write_text(SAG.replace("time: {duration: 1.0, step: 0.05}\n", ""))
-    said = call("trade", "sag.yaml")
-    assert said.code == 1 and "time" in said.err
-
-
 def test_a_file_in_the_place_of_the_folder_is_refused(call: Call) -> None:
     said = call("trade", "sag.yaml", *SHORT, "-o", "sag.yaml")
     assert said.code == 1 and "sag.yaml is no folder for a study" in said.err and "Traceback" not in said.err

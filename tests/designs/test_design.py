@@ -16,6 +16,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.designs.design import Found, Identified
 from hybrid.scene.read import one_line
+from tests.combinations.pairs import as_network
 from tests.scenes import cable_scene, pinned_at
 
 pytestmark = pytest.mark.needs("simpleeval")
@@ -410,17 +411,11 @@ WATER = {"fluid": {"density": 1025}, "seabed": {"z": -40.0, "stiffness": 1e4}}
 
 def _sagging(turn, several):
     """A short and heavy line that pulls with 12 kN at most, and stays 10 m off the bed; turned in plan."""
-    far = [100.0 * math.cos(turn), 100.0 * math.sin(turn), 0.0]
-    places, cells = {"start": [0.0, 0.0, -10.0], "end": far}, {"cells": 40}
-    if several:
-        line = {"start": "start", "end": "end", "sections": [SAG], "model": "rod", "mesh": cells}
-        scene = {"environment": WATER, "points": {k: {"position": x} for k, x in places.items()}, "lines": {"a": line}}
-    else:
-        ends = {k: {"kind": "pinned", "position": x} for k, x in places.items()}
-        scene = {"environment": WATER, "cable": {"sections": [SAG]}, "ends": ends, "initial": "equilibrium",
-                 "model": "rod", "mesh": cells}  # fmt: skip
-    table = "lines.a" if several else "cable"
-    of_line = {"line": "a"} if several else {}
+    far = pinned_at(100.0 * math.cos(turn), 100.0 * math.sin(turn), 0.0)
+    scene = cable_scene(SAG, pinned_at(0, 0, -10), far, environment=WATER, model="rod", mesh=40)
+    scene = as_network(scene) if several else scene
+    table = "lines.cable" if several else "cable"
+    of_line = {"line": "cable"} if several else {}
     return hybrid.design(
         scene, unknowns={"L": {"key": f"{table}.sections[0].length", "low": 105, "high": 150},
                          "m": {"key": f"{table}.sections[0].mass", "low": 12, "high": 40}},

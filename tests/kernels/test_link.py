@@ -4,29 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from problems import writhe as writhe_of
 
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.state.state import Ends, Floats, Line, blank_line, no_ends
 
 FAR = 300.0  # lengths of the line, at which the closed polygon of the tests turns back
-
-
-def solid_angle(a: Floats, b: Floats, c: Floats, d: Floats) -> float:
-    """Signed area, on the unit sphere, of the directions from points of ab to points of cd (Klenin, Langowski 2000)."""
-    ac, ad, bd, bc = c - a, d - a, d - b, c - b
-    normals = [np.cross(*x) for x in ((ac, ad), (ad, bd), (bd, bc), (bc, ac))]
-    if min(np.linalg.norm(x) for x in normals) == 0.0:
-        return 0.0
-    n = [x / np.linalg.norm(x) for x in normals]
-    area = sum(np.arcsin(np.clip(n[k] @ n[(k + 1) % 4], -1.0, 1.0)) for k in range(4))
-    return float(area * np.sign(np.cross(d - c, b - a) @ ac))
-
-
-def writhe_of(points: Floats) -> float:
-    """Writhe of a closed polygon, turns."""
-    n = len(points)
-    pairs = [(i, j) for i in range(n) for j in range(i + 2, n) if (i, j) != (0, n - 1)]
-    return sum(solid_angle(points[i], points[i + 1], points[j], points[(j + 1) % n]) for i, j in pairs) / (2.0 * np.pi)
 
 
 def closed(r: Floats, t0: Floats, tn: Floats) -> Floats:

@@ -383,15 +383,6 @@ def test_loads_that_change_in_time_are_refused(load):
     scene["ends"]["end"] = {"kind": "free", "force": load}
     with pytest.raises(hybrid.SceneError, match=r"ends.end.force(.|\n)*loads that stay"):
         hybrid.response(scene)
-    section = scene["cable"]["sections"]
-    lines = {"hung": {"start": "anchor", "end": "top", "sections": section, "mesh": {"cells": 20}, "model": "catenary"}}
-    points = {
-        "anchor": {"kind": "fixed", "position": [0, 0, -65]},
-        "top": {"kind": "free", "initial_guess": [0, 0, -5], "force": load},
-    }
-    system = {"environment": scene["environment"], "points": points, "lines": lines, "time": scene["time"]}
-    with pytest.raises(hybrid.SceneError, match=r"points.top.force(.|\n)*loads that stay"):
-        hybrid.response(system)
 
 
 def test_a_load_that_grows_is_that_of_the_equilibrium():

@@ -115,20 +115,16 @@ def test_an_anchor_beside_touchdown_and_above_the_bed() -> None:
 ANCHORED = {"length": 60, "mass": 3, "diameter": 0.04, "axial_stiffness": 1e6, "bending_stiffness": 50}
 
 
-def anchored(cells: int, model: str, clamped: bool, height: float, several: bool = False) -> dict[str, Any]:
+def anchored(cells: int, model: str, clamped: bool, height: float, exchanged: bool = False) -> dict[str, Any]:
     """An umbilical from a support at a height above its bed of 3 kN/m2; its layers, 0.24 to 0.6 m, are within a cell."""
-    end = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 1, 0]} if clamped else {"kind": "pinned"}
-    sea = {"fluid": {"density": RHO}, "seabed": {"z": -20, "stiffness": 3000, "damping": 0}}
-    places, mesh = ([0, 0, height - 20], [50, 0, -1]), {"cells": cells}
-    if not several:
-        ends = {"start": end | {"position": places[0]}, "end": {"kind": "pinned", "position": places[1]}}
-        line = {"cable": {"sections": [ANCHORED]}, "ends": ends, "initial": "equilibrium", "model": model, "mesh": mesh}
-        return {"environment": sea} | line
-    line = {"start": "b", "end": "a", "sections": [ANCHORED], "model": model, "mesh": mesh}  # the other way round
+    end = pinned_at(0, 0, height - 20)
     if clamped:
-        line["connections"] = {"end": end | {"tangent": [-1, 0, 0]}}
-    points = {name: {"position": place} for name, place in zip("ab", places, strict=True)}
-    return {"environment": sea, "points": points, "lines": {"one": line}}
+        end |= {"kind": "clamped", "tangent": [-1 if exchanged else 1, 0, 0], "normal": [0, 1, 0]}
+    ends = (end, pinned_at(50, 0, -1))
+    return cable_scene(
+        ANCHORED, *(ends[::-1] if exchanged else ends), fluid={"density": RHO},
+        seabed={"z": -20, "stiffness": 3000, "damping": 0}, model=model, mesh=cells
+    )  # fmt: skip
 
 
 SUPPORTS = [("rod", False), ("rod", True), ("catenary", False)]
@@ -141,16 +137,15 @@ def test_the_force_at_a_support_has_no_jump_and_no_kink_at_the_level_of_the_bed(
     It had two values by rounding at the level of the bed, 8.504 and 9.838 N of the rod, where such cells say 5.5 N."""
     heights = (-3e-3, -1e-5, 0.0, 1e-5, 1e-3, 0.1)
 
-    def forces(cells: int, several: bool = False) -> list[float]:
-        found = [hybrid.static(anchored(cells, model, clamped, z, several)) for z in heights]
-        of = [x.lines["one"]["reaction_end"] if several else x["reaction_start"] for x in found]
-        return [float(x[0, 2]) for x in of]
+    def forces(cells: int, exchanged: bool = False) -> list[float]:
+        found = [hybrid.static(anchored(cells, model, clamped, z, exchanged)) for z in heights]
+        return [float(x["reaction_end" if exchanged else "reaction_start"][0, 2]) for x in found]
 
     coarse, fine = forces(60), forces(960)
     below, above = coarse[2] - coarse[1], coarse[3] - coarse[2]
     assert below == pytest.approx(above, rel=0.04) and 0.0 < above < 0.01 * coarse[2]
     np.testing.assert_allclose(coarse, fine, rtol=0.12)
-    np.testing.assert_allclose(forces(60, several=True), coarse, rtol=1e-6)
+    np.testing.assert_allclose(forces(60, exchanged=True), coarse, rtol=1e-6)
 
 
 @pytest.mark.parametrize("model", ["catenary", "rod"])

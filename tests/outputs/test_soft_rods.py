@@ -12,7 +12,7 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.model.material import Material
 from hybrid.scene.read import one_line, validate_scene
-from tests.combinations.pairs import BASE, END, FEATURES, SECTION, as_network
+from tests.combinations.pairs import BASE, END, FEATURES, SECTION
 from tests.problems import tables_with
 from tests.scenes import cable_scene, pinned_at
 
@@ -119,10 +119,9 @@ def kinks(result: hybrid.Result) -> list[Any]:
 
 @pytest.mark.parametrize("name", LEFT)
 def test_where_kinks_count_as_bends_an_event_says_so(name: str) -> None:
-    """Of one cable and of a line of a system, once, of all the line; no verdict on bends, beyond the limit or within it."""
-    broken, within = (limited(radius, **LEFT[name]) for radius in (8.0, 0.1))
-    lines = hybrid.run(as_network(within)).lines
-    for found, radius in ((hybrid.run(broken), 8.0), (lines["cable"], 0.1)):
+    """Once, of all the line; no verdict on bends, beyond the limit or within it."""
+    for radius in (8.0, 0.1):
+        found = hybrid.run(limited(radius, **LEFT[name]))
         (said,) = kinks(found)
         first = next(event for event in found.events if event.kind == "grow")
         assert said.t == first.t > 0.0 and (said.s_a, said.s_b) == (0.0, 60.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -32,7 +33,11 @@ def test_a_cable_with_any_feature_is_a_network_that_is_read_back(name: str) -> N
     for made in (cable, in_full(cable)):
         again, _ = read_text(scene_text(made))
         assert again == made and again.asked_lines.keys() == made.asked_lines.keys()
-    assert dict(cable) == dict(in_full(cable)) and scene_text(line_of(cable)) == scene_text(cable)
+    network = in_full(cable)
+    assert dict(cable) == dict(network) and scene_text(line_of(cable)) == scene_text(cable)
+    asked = network.asked_scene(LINE)
+    ends = asked.ends if name == "release" else cable.ends  # where points say when they let go
+    assert replace(cable.asked_scene(LINE), title=asked.title, ends=ends) == asked
 
 
 @pytest.mark.parametrize("network", [False, True])

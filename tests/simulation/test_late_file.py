@@ -18,6 +18,7 @@ from hybrid.store import whole_file, writer
 from hybrid.store.format import ArrayContents
 from hybrid.store.records import FileContents
 from hybrid.store.whole_file import LateFile
+from tests.said import assert_same_results
 from tests.scenes import cable_scene, pinned_at
 
 TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run
@@ -84,16 +85,7 @@ def test_the_result_is_read_from_memory_as_from_its_file(tmp_path: Path, monkeyp
     with hybrid.run(described(True), tmp_path / "run.h5") as mine, hybrid.open(tmp_path / "run.h5") as its:
         hybrid.run(described(), tmp_path / "run.h5").close()  # neither hears of what takes their place
         assert isinstance(mine._contents, ArrayContents) and isinstance(its._contents, FileContents)
-        assert (mine.names, mine._groups) == (its.names, its._groups)
-        for name in mine.names:
-            assert (mine[name].dtype, mine[name].shape) == (its[name].dtype, its[name].shape), name
-            np.testing.assert_array_equal(mine[name], its[name], name)
-            assert (mine.dims(name), mine.units[name], mine.label(name)) == (
-                its.dims(name), its.units[name], its.label(name)
-            )  # fmt: skip
-        assert mine.attributes == its.attributes
-        assert {type(x) for x in mine.attributes.values()} == {type(x) for x in its.attributes.values()}
-        assert (mine.zones[:], mine.events, mine.scene_text) == (its.zones[:], its.events, its.scene_text)
+        assert_same_results(mine, its)
         assert len(mine.refresh().names) < len(its.names)  # of the file that is there now
     monkeypatch.setattr(whole_file, "MOST_STAYING", 0)
     with hybrid.run(described(), tmp_path / "run.h5") as result:

@@ -17,7 +17,6 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -213,21 +212,13 @@ def test_it_is_refused_in_words(what: str, good: Path, tmp_path: Path) -> None:
     assert "try:" in str(refused.value) and not (tmp_path / "longer.h5").exists()
 
 
-@pytest.mark.parametrize("several", [False, True])
-def test_a_file_keeps_the_interval_that_its_version_gave_it(
-    several: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_keeps_the_interval_that_its_version_gave_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene that does not say how often: a hundredth of the duration in 1.0.0, in each period six since then."""
-    section = {"length": 1.1, "mass": 1.0, "axial_stiffness": 1e4}
-    moved = {"position": (1, 0, 0), "motion": {"heave": {"amplitude": 1e-4, "period": 0.1}, "ramp": 0.2}}
-    scene: dict[str, Any] = {"time": {"duration": 4.0, "step": 0.01}, "output": {"points": 3}}
-    if several:
-        line = {"start": "a", "end": "b", "model": "catenary", "mesh": {"cells": 4}, "sections": [section]}
-        scene |= {"points": {"a": {"position": (0, 0, 0)}, "b": moved}, "lines": {"one": line}}
-    else:
-        ends = {"start": {"kind": "pinned", "position": (0, 0, 0)}, "end": {"kind": "pinned"} | moved}
-        scene |= {"cable": {"sections": [section]}, "ends": ends, "model": "catenary", "mesh": {"cells": 4}}
-        scene["initial"] = "equilibrium"
+    heave = {"heave": {"amplitude": 1e-4, "period": 0.1}, "ramp": 0.2}
+    scene = cable_scene(
+        {"length": 1.1, "mass": 1.0, "axial_stiffness": 1e4}, pinned_at(0, 0, 0), pinned_at(1, 0, 0, motion=heave),
+        model="catenary", mesh=4, time=(4.0, 0.01), output={"points": 3}
+    )  # fmt: skip
     monkeypatch.setattr("hybrid.scene.schema.PER_PERIOD", 1)
     hybrid.run(scene, tmp_path / "old.h5").close()
     monkeypatch.undo()

@@ -14,6 +14,7 @@ from hybrid.kernels.state.books import FRICTION
 from hybrid.kernels.step.newton import NEAR
 from hybrid.view.summary import facts_of
 from tests.inside import OnlyLine
+from tests.said import kinds, work_put_in
 from tests.scenes import cable_scene, pinned_at
 
 WIDTH, STIFF = 0.02, 0.1
@@ -127,7 +128,7 @@ def test_steps_of_a_line_that_has_not_come_near_itself_are_not_judged_by_contact
     with hybrid.run(scene) as result:
         steps = np.diff(result["steps/t"], prepend=0.0)
         assert steps.min() > 0.99 * scene["time"]["step"] and steps.size == 400
-        assert "steps cut" not in {event.kind for event in result.events}
+        assert "steps cut" not in kinds(result)
 
 
 @pytest.mark.long
@@ -192,10 +193,9 @@ def looped(**more: Any) -> dict[str, Any]:
 @pytest.mark.long
 def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
     free = hybrid.run(looped(contact={"self": False}))
-    assert "line meets itself" in {event.kind for event in free.events}
+    assert "line meets itself" in kinds(free)
     result = hybrid.run(looped())
-    kinds = {event.kind for event in result.events}
-    assert "line meets itself" not in kinds and "line touches itself" in kinds
+    assert "line meets itself" not in kinds(result) and "line touches itself" in kinds(result)
     assert float(result["self_distance/distance"]) > 0.85 * WIDTH
     touches = result["energy/self_contact"] > 0.0
     assert touches.any()
@@ -207,10 +207,7 @@ def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
     assert found.values["force"] == np.nanmax(result["envelope/self_contact_max"])
     apart = np.linalg.norm(result["position"] - free["position"], axis=2).max()
     assert apart > WIDTH
-    put_in = sum(
-        np.abs(result[name]).max() for name in result.names if name.startswith("work/") and name != "work/scheme"
-    )
-    assert result["work/scheme"].max() < 1e-3 * put_in
+    assert result["work/scheme"].max() < 1e-3 * work_put_in(result)
 
 
 @pytest.mark.long
@@ -240,10 +237,7 @@ def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
     assert rough["work/friction"][-1] < 0.0
     assert rough["steps/repeats"].sum() < 100  # 45; 363 where shifts went to and fro in Newton's method
     assert np.linalg.norm(rough["position"] - smooth["position"], axis=2).max() > 0.1 * WIDTH
-    put_in = sum(
-        np.abs(rough[name]).max() for name in rough.names if name.startswith("work/") and name != "work/scheme"
-    )
-    assert rough["work/scheme"].max() < 1e-3 * put_in
+    assert rough["work/scheme"].max() < 1e-3 * work_put_in(rough)
 
 
 def closing(model: Any, **more: Any) -> dict[str, Any]:
@@ -265,7 +259,7 @@ def test_catenaries_that_come_near_themselves_become_rods() -> None:
     watched = closing("adaptive")
     watched["output"]["criteria"] = True
     result = hybrid.run(watched)
-    assert {"grow", "line touches itself"} <= {event.kind for event in result.events}
+    assert {"grow", "line touches itself"} <= kinds(result)
     assert "contact" in {event.criterion for event in result.events}
     assert float(result["self_distance/distance"]) > 0.85 * WIDTH
     for zones, x, near in zip(result.zones, result["position"], result["criteria/contact"], strict=True):
@@ -288,8 +282,7 @@ def test_fixed_zones_touch_each_other(asked: bool | None) -> None:
     """The legs of a U, catenaries whose bend between them is rod; against rods."""
     contact = {"friction": 0.3} | ({"self": True} if asked else {})
     result = hybrid.run(closing(LEGS, mesh={"cells": 160}, contact=contact))
-    kinds = {event.kind for event in result.events}
-    assert "line meets itself" not in kinds and "line touches itself" in kinds
+    assert "line meets itself" not in kinds(result) and "line touches itself" in kinds(result)
     assert result["energy/self_contact"].any() and float(result["self_distance/distance"]) > 0.85 * WIDTH
     put_in = np.abs(result["work/end"]).max() + np.ptp(result["energy/potential"])
     assert result["work/scheme"].max() < 1e-3 * put_in
@@ -313,8 +306,7 @@ def test_an_equilibrium_in_contact(resting: tuple[dict[str, Any], hybrid.Result]
     """No turn of the clamps is lost, strands are apart, and what is left over shows that it is an equilibrium."""
     result = resting[1]
     assert result.status == "complete" and "damped motion with contact" in result.message
-    kinds = {event.kind for event in result.events}
-    assert "line touches itself" in kinds and not kinds & {"stability not judged", "unstable"}
+    assert "line touches itself" in kinds(result) and not kinds(result) & {"stability not judged", "unstable"}
     assert any(e.kind == "static friction neglected" and "touches itself" in e.text for e in result.events)
     assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9)
     assert result["turns/writhe"][0] > 1.5
@@ -330,7 +322,7 @@ def test_a_run_stays_where_it_touches_itself_at_rest(resting: tuple[dict[str, An
     assert np.abs(result["position"] - static["position"]).max() < 1e-9
     assert result["tension"] == pytest.approx(np.broadcast_to(static["tension"], result["tension"].shape), abs=1e-5)
     assert result["energy/self_contact"] == pytest.approx(float(static["energy/self_contact"][0]), rel=1e-6)
-    assert "unstable" not in {event.kind for event in result.events}
+    assert "unstable" not in kinds(result)
 
 
 def test_ends_that_are_led_through_each_other_are_told() -> None:

@@ -1,4 +1,4 @@
-"""Several lines in motion: a system of one line is that line, energies close, files hold every line."""
+"""Several lines in motion: energies close, files hold every line, what is computed beside what."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from test_system_saving import spar
 
 import hybrid
-from hybrid.errors import ComputationError, ResultError, SceneError
+from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
 from hybrid.simulation import progress, run_of_lines
@@ -173,11 +173,6 @@ def test_a_line_that_stays_stretched_beyond_its_limit_stops_with_its_name() -> N
     tables = buoy(lines={"riser": {"start": "anchor", "end": "buoy", "sections": [section], "mesh": {"cells": 30}}})
     with pytest.raises(ComputationError, match="line riser"):
         hybrid.run(tables)
-
-
-def test_a_run_asks_for_a_duration() -> None:
-    with pytest.raises(SceneError, match="duration"):
-        hybrid.run({k: x for k, x in buoy().items() if k != "time"})
 
 
 def test_a_force_on_a_point_that_is_let_go_ends_where_it_says() -> None:

@@ -19,7 +19,7 @@ from hybrid.scene.motion_tables import Motion
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
 from hybrid.simulation import equilibrium
-from tests.said import line_of, said
+from tests.said import kinds, line_of, said
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 GJ, LENGTH = 0.789, 100.0
@@ -48,10 +48,6 @@ def taut(first=None, second=None, section=None, **more) -> hybrid.Scene:
 
 def torque_of(turns: float) -> float:
     return GJ * 2.0 * math.pi * turns / LENGTH
-
-
-def kinds(result) -> set[str]:
-    return {event.kind for event in result.events}
 
 
 # --- statics -------------------------------------------------------------------------------------
@@ -310,7 +306,7 @@ def test_turns_of_a_clamp_pass_a_swivel(model: str, tmp_path: Path) -> None:
     moved = np.abs(turned.position[-1] - still.position[-1]).max()
     assert moved < (1e-3 if model == "adaptive" else 1e-4) * LENGTH_SWIVEL  # zones that move are where they were of use
     assert "turns/link" not in turned.names
-    assert not {"unresolved twist", "steps cut", "loop can form"} & {event.kind for event in turned.events}
+    assert not {"unresolved twist", "steps cut", "loop can form"} & kinds(turned)
 
 
 def test_without_a_swivel_turns_of_a_clamp_are_held(tmp_path: Path) -> None:

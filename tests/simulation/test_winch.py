@@ -279,25 +279,6 @@ def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("dimension", [2, 3])  # where it says none, it runs in its plane and is stepped in space
-def test_stepped_from_outside_bit_for_bit(dimension: int) -> None:
-    """Every other step is taken twice, elsewhere at first."""
-    scene = lowered() | {"time": {"duration": 3.0, "step": STEP}, "dimension": dimension}
-    with hybrid.Simulation(scene) as sim:
-        while sim.t < 3.0:
-            saved = sim.save()
-            sim.advance(min(sim.t + 0.3 * STEP, 3.0))
-            sim.restore(saved)
-            sim.step()
-            sim.step()
-        stepped = sim.result().lines["one"]
-    whole = hybrid.run(scene).lines["one"]
-    assert np.ptp(whole["payout/length"]) > 0.05
-    for name in ("position", "tension", "reaction_start", "payout/length", "payout/rate", "work/start"):
-        assert np.array_equal(whole[name], stepped[name]), name
-
-
-@pytest.mark.long
 def test_an_accuracy_that_is_asked_holds() -> None:
     """Positions lie within their stated error of those of short fixed steps on twice the cells."""
     fine = lowered() | {"time": {"duration": 4.0, "step": 0.005}}

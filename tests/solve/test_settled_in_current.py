@@ -51,17 +51,6 @@ def test_a_chain_across_a_current_lies_where_it_was_laid() -> None:
     assert "against friction from where it lay without tension in still water" in settled.attributes["static_path"]
 
 
-def test_lines_of_a_system_are_laid_in_still_water_too() -> None:
-    """A point in the place of the upper end, which other lines hold, changes nothing of it."""
-    keys = ("model", "mesh", "initial")
-    line = {"sections": [CHAIN], "start": "anchor", "end": "top", **{k: chain()[k] for k in keys}}
-    points = {"anchor": {"position": ANCHOR}, "top": {"position": TOP}}
-    system = {"environment": sea(), "points": points, "lines": {"chain": line}, "output": {"points": 91}}
-    one, alone = hybrid.static(system).lines["chain"], hybrid.static(chain())
-    np.testing.assert_allclose(one.position, alone.position, atol=1e-6)
-    np.testing.assert_allclose(one.tension, alone.tension, rtol=1e-6, atol=1e-3)
-
-
 def test_still_water_changes_nothing_where_no_current_acts() -> None:
     calm = sea()
     del calm["fluid"]["current"]

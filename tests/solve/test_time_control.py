@@ -340,14 +340,14 @@ def scene(model, step, rho):
 
 
 @pytest.mark.parametrize("rho", [0.5, 0.8])
-@pytest.mark.parametrize("model", MODELS)
-def test_second_order(model, rho):
-    results = [hybrid.run(scene(model, step, rho)) for step in (0.02, 0.01, 0.005, 0.0025)]
+def test_second_order(rho):
+    """Of a rod between catenaries; of each alone it is that of equal steps above."""
+    results = [hybrid.run(scene("hybrid", step, rho)) for step in (0.02, 0.01, 0.005, 0.0025)]
     orders = {}
     for name in ("position", "tension"):
         change = [np.sqrt(np.mean((a[name] - b[name]) ** 2)) for a, b in pairwise(results)]
         orders[name] = [float(np.log2(a / b)) for a, b in pairwise(change)]
-    print(f"{model}, rho_inf {rho}: order {orders}")
+    print(f"rho_inf {rho}: order {orders}")
     assert np.abs(np.array(orders["position"]) - 2.0).max() < 0.2
     assert min(orders["tension"]) >= 1.8
     assert max(orders["tension"]) < 2.5

@@ -16,6 +16,8 @@ from hybrid.cli.commands import app
 from hybrid.errors import SceneError
 from hybrid.store.capacity import E301, F201, Row, code_of_steps, collapse, most_used, of_riser, use, used
 from hybrid.store.statistics_table import rows_of
+from tests.combinations.pairs import as_network
+from tests.said import line_of
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 TRIANGLE, BOX = [[100.0, 0.0], [0.0, 2.0]], [[100.0, 0.0], [100.0, 2.0], [0.0, 2.0]]
@@ -126,19 +128,8 @@ def test_what_steps_may_have_between_outputs_is_not_verified():
 
 
 def test_one_line_of_several_has_its_capacity():
-    tables = hung()
-    one = hybrid.run(tables)
-    points = {
-        "a": {"kind": "fixed", "position": [0, 0, 0]},
-        "b": {"kind": "fixed", "position": [17, 0, 0], "motion": tables["ends"]["end"]["motion"]},
-    }
-    line = {
-        "start": "a", "end": "b", "sections": tables["cable"]["sections"], "model": "rod", "mesh": {"cells": 40},
-        "connections": {"start": {"kind": "clamped", "tangent": [1, 0, 0.2]}},
-    }  # fmt: skip
-    several = {"points": points, "lines": {"l": line}, "time": tables["time"], "output": tables["output"]}
-    with hybrid.run(several) as result:
-        mine = result.lines["l"]
+    with hybrid.run(hung()) as one, hybrid.run(as_network(hung())) as result:
+        mine = line_of(result)
         np.testing.assert_allclose(mine["capacity_used"], one["capacity_used"], rtol=1e-6, atol=1e-5)
         assert [x.limit for x in mine.verdicts().quantities] == ["capacity"]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -55,17 +54,6 @@ def heavy_capstan(friction: float) -> Tables:
         "model": "rod", "mesh": {"cells": 240}, "contact": {"self": False},
         "time": {"duration": 1.5, "step": 0.005}, "output": {"every": 0.1, "points": 101},
     }  # fmt: skip
-
-
-def as_lines(tables: Tables) -> Tables:
-    """The scene of a cable as one of several lines, `rope` between the points a and b."""
-    keys = ("model", "contact", "initial", "mesh")
-    line = {"start": "a", "end": "b", **tables["cable"], **{k: tables[k] for k in keys if k in tables}}
-    points = {
-        x: {k: y for k, y in tables["ends"][end].items() if k != "kind"} for x, end in (("a", "start"), ("b", "end"))
-    }
-    own = {k: x for k, x in tables.items() if k not in (*keys, "cable", "ends")}
-    return deepcopy(own | {"points": points, "lines": {"rope": line}})
 
 
 def over_pipe(**more: Any) -> Tables:

@@ -14,7 +14,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.obstacle_scenes import CENTRELINE, STRAND, Tables, as_lines, capstan, half_turn
+from tests.validation.obstacle_scenes import CENTRELINE, STRAND, Tables, capstan, half_turn
 from tests.validation.test_validation_obstacles_accuracy import ASKED, DRAGGED, LOW, parts
 
 MU = 0.3
@@ -359,18 +359,14 @@ def stepped(tables: Tables, again: bool) -> Any:
     return bar, result
 
 
-@pytest.mark.parametrize("several", [False, True])
-def test_an_obstacle_that_is_set_from_outside_moves_as_by_a_motion(aside: Any, several: bool) -> None:
-    tables = as_lines(from_outside()) if several else from_outside()
-    bar, result = stepped(tables, False)
-    rope = result.lines["rope"] if several else result
+def test_an_obstacle_that_is_set_from_outside_moves_as_by_a_motion(aside: Any) -> None:
+    bar, rope = stepped(from_outside(), False)
     np.testing.assert_allclose(rope.position, aside.position, atol=1e-4)
     np.testing.assert_allclose(bar.force, aside["obstacles/bar/force"][-1], atol=0.02)
     np.testing.assert_allclose(bar.moment, rope["obstacles/bar/moment"][-1], atol=1e-9)
     np.testing.assert_allclose(bar.position, course(0.8)[0], atol=1e-12)
     np.testing.assert_allclose(bar.rotation, course(0.8)[2], atol=1e-9)
-    again, same = stepped(tables, True)
-    other = same.lines["rope"] if several else same
+    again, other = stepped(from_outside(), True)
     np.testing.assert_array_equal(other.position, rope.position)
     np.testing.assert_array_equal(again.moment, bar.moment)
 
@@ -396,12 +392,11 @@ def test_what_cannot_be_set_is_refused() -> None:
         ({"inertia": 2.0}, "obstacles.bar.inertia"),
     ],
 )
-@pytest.mark.parametrize("several", [False, True])
-def test_motions_that_cannot_be_computed_are_refused(change: Tables, where: str, several: bool) -> None:
+def test_motions_that_cannot_be_computed_are_refused(change: Tables, where: str) -> None:
     tables = pushed()
     tables["obstacles"]["bar"] |= change
     with pytest.raises(SceneError) as refused:
-        hybrid.validate_scene(as_lines(tables) if several else tables)
+        hybrid.validate_scene(tables)
     assert [x.where for x in refused.value.complaints] == [where]
 
 

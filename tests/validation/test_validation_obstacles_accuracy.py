@@ -11,7 +11,7 @@ import hybrid
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import one_line
 from tests.scenes import cable_scene, pinned_at
-from tests.validation.obstacle_scenes import as_lines, over_pipe
+from tests.validation.obstacle_scenes import over_pipe
 
 Tables = dict[str, Any]
 # Estimated over true error, as asked of the project; the upper bound is wider where the result is far better than asked.
@@ -78,15 +78,12 @@ def test_figures_are_those_of_a_fine_run_and_steps_meet_what_is_asked(tables: Ta
 
 @pytest.mark.long
 def test_figures_of_given_cells_and_steps(heaved: Any) -> None:
-    """Both-sided, of tension too, whose slope jumps where friction begins: of order 1.  Of a system of one line as well."""
+    """Both-sided, of tension too, whose slope jumps where friction begins: of order 1."""
     given = HEAVE | {
         "mesh": {"cells": 128}, "time": {"duration": 6.0, "step": 0.05}, "output": HEAVE["output"] | {"errors": True}
     }  # fmt: skip
-    alone, system = hybrid.run(given), hybrid.run(as_lines(given)).lines["rope"]
-    for result in (alone, system):
-        for name, (said, true) in parts(result, heaved).items():
-            assert LOW * true < said < HIGH * true, (name, said, true)
-    assert system.errors["total/tension"].max() == pytest.approx(alone.errors["total/tension"].max(), rel=0.05)
+    for name, (said, true) in parts(hybrid.run(given), heaved).items():
+        assert LOW * true < said < HIGH * true, (name, said, true)
 
 
 @pytest.mark.long
@@ -95,11 +92,9 @@ def test_figures_of_given_cells_and_steps(heaved: Any) -> None:
 def test_a_rope_lies_over_the_pipe_on_any_cells(model: str, cells: int) -> None:
     """Not round it, stretched by 17 %, where its catenary hangs through the pipe; of order 2 from 25 cells on."""
     at_rest = scene(None, 1.0) | {"model": model, "mesh": {"cells": cells}}
-    with hybrid.static(at_rest) as alone, hybrid.static(as_lines(at_rest)) as system:
-        for found in (alone, system.lines["rope"]):
-            place = found.position[-1]
-            top = np.interp(PIPE["at"][0], place[:, 0], place[:, 2])
-            assert top == pytest.approx(-0.878, abs=0.05 if cells < 25 else 0.01)
+    place = hybrid.static(at_rest).position[-1]
+    top = np.interp(PIPE["at"][0], place[:, 0], place[:, 2])
+    assert top == pytest.approx(-0.878, abs=0.05 if cells < 25 else 0.01)
 
 
 def test_steps_resolve_the_motion_of_an_obstacle() -> None:
@@ -159,20 +154,17 @@ def under_pipe(cells: int, x: float = 5.0, **more: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(("cells", "x"), [(40, 5.0), (100, 5.0), (101, 5.0), (100, 4.9), (100, 5.01), (200, 5.0)])
 def test_a_line_that_hangs_through_a_pipe_lies_on_it_on_any_mesh(cells: int, x: float) -> None:
     """On most of these meshes it was found round the pipe from below, stretched by 1 %, within what it bears."""
-    alone = hybrid.static(hybrid.validate_scene(under_pipe(cells, x)))
-    system = hybrid.static(as_lines(under_pipe(cells, x)))
-    for tension, events in ((alone.tension, alone.events), (system.lines["rope"].tension, system.events)):
-        assert tension.max() == pytest.approx(53.0, rel=0.01)
-        assert not any(event.kind == "several equilibria" for event in events)
+    found = hybrid.static(hybrid.validate_scene(under_pipe(cells, x)))
+    assert found.tension.max() == pytest.approx(53.0, rel=0.01)
+    assert not any(event.kind == "several equilibria" for event in found.events)
 
 
 def test_a_line_that_is_found_behind_a_pipe_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no way leads to the other side: stretched round the pipe, here without the ways that do."""
     monkeypatch.setattr("hybrid.simulation.equilibrium.behind_obstacles", lambda *_: iter(()))
-    with hybrid.static(as_lines(under_pipe(100))) as found:
-        one = found.lines["rope"]
-        (said,) = [x for x in one.events if x.kind == "several equilibria"]
-        assert one.tension.max() > 1e4 and "obstacle pipe" in said.text
+    found = hybrid.static(under_pipe(100))
+    (said,) = [x for x in found.events if x.kind == "several equilibria"]
+    assert found.tension.max() > 1e4 and "obstacle pipe" in said.text
 
 
 @pytest.mark.parametrize(("cells", "left"), [(30, True), (60, False)])
