@@ -150,7 +150,7 @@ def _contact(on: Mapping[str, str]) -> str:
 
 def _of_lines(system: Any, on: Mapping[str, str]) -> str:
     """Which lines touch each other, and what else they touch."""
-    pairs, found = [f"{a} with {b}" for a, b in system.touching_pairs], []
+    pairs, found = [f"{a} with {b}" for a, b in system.meeting_pairs], []
     if pairs:
         named = ", ".join(pairs[:MOST_PAIRS]) + (
             f" and {len(pairs) - MOST_PAIRS} more" if len(pairs) > MOST_PAIRS else ""
@@ -161,6 +161,8 @@ def _of_lines(system: Any, on: Mapping[str, str]) -> str:
         found.append(f"of lines with each other{rubs}: {named}")
     elif OTHERS in on:
         found.append(f"of lines with each other, {on[OTHERS]}")
+    elif system.contact is not None and system.contact.between is None:
+        found.append("lines cannot reach each other")
     elif len(system.lines) > 1:
         found.append("lines pass through each other, and an event says where: contact: {} keeps them apart")
     shapes = [name for name, body in system.free_bodies.items() if body.shape is not None]

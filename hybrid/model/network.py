@@ -222,7 +222,7 @@ def build_system(
     rides = _leave_own_bodies(system, models)
     scenes = {name: system.scene_of(name) for name in system.lines}
     names = list(system.lines)
-    pairs = ((names.index(a), names.index(b)) for a, b in system.touching_pairs)
+    pairs = ((names.index(a), names.index(b)) for a, b in system.meeting_pairs)
     touching = touching_among(system, scenes, pairs)
     if touching is not None:
         models = _with_contact(system, models, touching)

@@ -64,7 +64,7 @@ from hybrid.scene.points import (
     Name,
     Point,
 )
-from hybrid.scene.schema import Asked, LineScene, SceneTables
+from hybrid.scene.schema import Asked, LineScene, SceneTables, may_meet
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -300,6 +300,14 @@ class Network(SceneTables, Asked):
         if self.contact is None:
             return []
         return list(combinations(self.lines, 2)) if self.contact.between is None else list(self.contact.between)
+
+    @property
+    def meeting_pairs(self) -> list[tuple[str, str]]:
+        """Those of `touching_pairs` between which contact is computed: of all lines those that reach each other."""
+        if self.contact is None or self.contact.between is not None:
+            return self.touching_pairs
+        scenes = {name: self.scene_of(name) for name in self.lines}
+        return [(a, b) for a, b in self.touching_pairs if may_meet(scenes[a], scenes[b])]
 
     def first_place(self, point: str) -> Triple:
         """Where a point is held at rest, or first looked for [m]; not of a free end that says nothing of it."""

@@ -249,8 +249,23 @@ def may_reach(scene: LineScene, obstacle: Obstacle) -> bool:
     shift = _shift_of_obstacle(obstacle)
     if math.isinf(shift):
         return True
-    apart = shift + APART * max(x.diameter or 0.0 for x in scene.cable.sections) + ROUND_OFF * scene.length
+    apart = shift + _spare(scene)
     return all(any(obstacle.distance(x.middle) <= x.radius + apart for x in balls) for balls in _covers(scene))
+
+
+def may_meet(scene: LineScene, other: LineScene) -> bool:
+    """Whether two lines may touch each other; where no bound is known they may."""
+    apart = sum(_spare(x) for x in (scene, other))
+    for balls, others in zip(_covers(scene), _covers(other), strict=False):
+        near = [*others]
+        if not any(math.dist(x.middle, y.middle) <= x.radius + y.radius + apart for x in balls for y in near):
+            return False
+    return True
+
+
+def _spare(scene: LineScene) -> float:
+    """How far (m) a line may be from the middle of what it touches, beside the half thickness of that."""
+    return APART * max(x.diameter or 0.0 for x in scene.cable.sections) + ROUND_OFF * scene.length
 
 
 def longest_stretched(scene: LineScene) -> float:

@@ -55,7 +55,8 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     is in a plane follows from the scene; rarely its first shape leaves the plane.
     """
     lines = {name: scene.asked_scene(name) for name in scene.lines}
-    together = {x for pair in scene.touching_pairs for x in pair}
+    pairs = scene.meeting_pairs
+    together = {x for pair in pairs for x in pair}
     together |= {name for name, x in scene.lines.items() if scene.is_joined(x.start) or scene.is_joined(x.end)}
     alone = {name: x for name, x in lines.items() if name not in together}
     planar = {name: x for name, x in alone.items() if not _is_in_space(x, scene.dimension)}
@@ -71,7 +72,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
         found += [CRITERIA] if static else [*ZONE_CHANGES, ZONES]
     if not static and any(payout_of(x) is not None for x in lines.values()):
         found += PAYOUT_OF_LINES
-    if scene.touching_pairs or touch_themselves:
+    if pairs or touch_themselves:
         found += TOUCHING_LINES
     if touch_themselves:
         found.append(TOUCHING)

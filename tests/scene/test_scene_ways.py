@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, SceneError
+from hybrid.model.network import build_system
 from hybrid.model.plausibility import implausible
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel, farthest, shift
@@ -188,3 +189,31 @@ def test_a_body_that_turns_swings_the_end_of_a_line() -> None:
             "lines": {"line": {"start": "a", "end": "b", "sections": [SECTION], "model": "catenary"}},
         }  # fmt: skip
         assert reaches(hybrid.validate_scene(tables)) == bool(motion)
+
+
+def lines(apart: float, **second: Any) -> hybrid.Scene:
+    """Two lines that reach HALF_WAY from their spans, which lie so far (m) apart, and touch if they can."""
+    points = {f"{x}{k}": {"position": [at, k * apart, 0.0]} for x, at in (("a", 0.0), ("b", 100.0)) for k in (0, 1)}
+    points["b1"] |= second
+    section = {"sections": [SECTION], "model": "catenary"}
+    each = {f"line{k}": section | {"start": f"a{k}", "end": f"b{k}"} for k in (0, 1)}
+    return hybrid.validate_scene(STILL | {"points": points, "lines": each, "contact": {}})
+
+
+@pytest.mark.parametrize(
+    ("second", "meet"),
+    [
+        ({}, False),
+        ({"motion": {"sway": {"amplitude": 9.0, "period": 9.0}, "ramp": 9.0}}, True),
+        ({"motion": {"velocity": [1, 0, 0], "ramp": 1.0}}, True),
+        ({"break_at": {"time": 0.5}}, True),
+    ],
+)
+def test_lines_that_cannot_reach_each_other_are_no_pair(second: dict[str, Any], meet: bool) -> None:
+    """Of all lines; a pair that is named stays one, and where no bound is known, as of a tow, they may meet."""
+    near, far = lines(2.0 * HALF_WAY + 1.0), lines(2.0 * HALF_WAY + 5.0, **second)
+    assert near.meeting_pairs == [("line0", "line1")]
+    assert bool(far.meeting_pairs) == meet
+    assert (build_system(far).touching is not None) == meet
+    named = hybrid.validate_scene(far.model_dump(exclude_none=True) | {"contact": {"between": [["line0", "line1"]]}})
+    assert named.meeting_pairs == [("line0", "line1")]
