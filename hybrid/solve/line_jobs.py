@@ -152,7 +152,7 @@ class LineJobs:
         }  # fmt: skip
         whole = joints | {
             "near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides, "phase": self._phase,
-            "marks": np.zeros(nodes if len(borders) > 1 else 0, np.int64),
+            "marks": np.zeros(nodes, np.int64),
         }  # fmt: skip
         return Rooms(
             whole, rows, {name: _always(x) for name, x in borders.items()} | {"torques": _torques_of(self._twists)}

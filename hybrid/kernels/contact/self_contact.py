@@ -68,7 +68,7 @@ from hybrid.kernels.state.report import (
     STRETCH_ENERGY,
     TOUCHES,
 )
-from hybrid.kernels.state.state import Blocks, Ends, Line, Rows, State, Work, blanks
+from hybrid.kernels.state.state import Ends, Line, Rows, State, Work, blanks
 from hybrid.kernels.step.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.step.step_control import before_fixed, radius_of_step, scheme
 
@@ -226,8 +226,6 @@ class ContactJob(NamedTuple):
     velocity: Rows  # (2, 3) m/s
     power: Rows  # (2, RATES) W
     report: Rows  # (3, REPORT_SIZE)
-    carried: Rows  # of kernels.state.state.Sea, where a sheave turns freely; else empty
-    rolling: Blocks
 
 
 blank_contact_job = blanks(ContactJob)
@@ -459,8 +457,6 @@ def contact_task(table):
     if phase != TOUCH:
         return numbers.energy + (numbers.tried if rubs else 0.0)
     charge(line, contact, job.counts)
-    if contact.counts.overflow or (
-        contact.counts.points > 0 and not solve_contact(ends, contact, work, job.carried, job.rolling)
-    ):
+    if contact.counts.overflow or (contact.counts.points > 0 and not solve_contact(ends, contact, work)):
         return 0.0
     return 1.0

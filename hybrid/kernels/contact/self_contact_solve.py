@@ -12,7 +12,6 @@ import math
 from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, solve_backward, sweep
 from hybrid.kernels.contact.self_contact_law import add_gradient, add_held, add_held_product, add_product
 from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
-from hybrid.kernels.laws.sheaves import turn_along
 from hybrid.kernels.machine.compile import called, inner
 
 # GMRES leaves a part of its first residual: PART_LEFT of the part that Newton's method leaves of the correction.
@@ -56,23 +55,9 @@ def first_node(contact):
     return first
 
 
-@inner
-def first_moved(rolling, before):
-    """The first node that moves sheaves; `before`: none does before that node."""
-    for j in range(2, rolling.shape[0], 3):
-        for i in range(before):
-            if rolling[j, i, 1] != 0.0 or rolling[j, i, 2] != 0.0 or rolling[j, i, 3] != 0.0:
-                before = i
-                break
-    return before
-
-
 @called
-def respond(ends, contact, work, carried, rolling, with_gradient, begin):
-    """contact.z = A^-1 (H x + g) from node `begin` on, g where asked; x of the nodes in contact.
-
-    carried, rolling: of sheaves that turn freely (kernels.laws.sheaves), which A has too; empty: there are none.
-    """
+def respond(ends, contact, work, with_gradient, begin):
+    """contact.z = A^-1 (H x + g) from node `begin` on, g where asked; x of the nodes in contact."""
     find_forces(contact, with_gradient)
     y, z = contact.y, contact.z
     last = y.shape[0] - 1
@@ -91,9 +76,7 @@ def respond(ends, contact, work, carried, rolling, with_gradient, begin):
         carry_given(work.X, work.W, contact.marks, z, False, first)
     else:
         sweep(work.X, work.W, contact.sweep, contact.marks, z, False, first)
-    good = solve_backward(work.X, z, begin)
-    turn_along(carried, rolling, rolling.shape[0] // 3, z)
-    return good
+    return solve_backward(work.X, z, begin)
 
 
 @inner
@@ -200,7 +183,7 @@ def load_vector(contact, column):
 
 
 @inner
-def find_solution(ends, contact, work, carried, rolling):
+def find_solution(ends, contact, work):
     """GMRES: contact.x = the correction of the nodes in contact; False: not finite.
 
     It begins at zero, where the residual is A^-1 (b + g), which falls as Newton converges.  The correction x0 of a line
@@ -210,15 +193,11 @@ def find_solution(ends, contact, work, carried, rolling):
     count, per = contact.counts.nodes, unknowns(contact)
     begin = first_node(contact)
     prepare_sweep(work.X, work.W, contact.sweep, begin, contact.z.shape[0] - 1)
-    begin = first_moved(rolling, begin)
-    for i in range(begin if rolling.shape[0] > 0 else 0):
-        for j in range(5):
-            z[i, j] = 0.0
     for k in range(count):
         i = contact.nodes[k]
         for j in range(per):
             x[i, j] = 0.0
-    if not respond(ends, contact, work, carried, rolling, True, begin):
+    if not respond(ends, contact, work, True, begin):
         return False
     s = 0.0
     for k in range(count):
@@ -236,7 +215,7 @@ def find_solution(ends, contact, work, carried, rolling):
         left, most = s, enough(s, contact.numbers.widest, per * count)
         while done < min(MOST_PRODUCTS, per * count) and left > most:
             load_vector(contact, done)
-            if not respond(ends, contact, work, carried, rolling, False, begin):
+            if not respond(ends, contact, work, False, begin):
                 return False
             for k in range(count):
                 i = contact.nodes[k]
@@ -252,11 +231,11 @@ def find_solution(ends, contact, work, carried, rolling):
 
 
 @inner
-def solve_contact(ends, contact, work, carried, rolling):
+def solve_contact(ends, contact, work):
     """Put contact into the correction work.x of a line without it; False if it is not finite."""
-    if not find_solution(ends, contact, work, carried, rolling):
+    if not find_solution(ends, contact, work):
         return False
-    if not respond(ends, contact, work, carried, rolling, True, 0):
+    if not respond(ends, contact, work, True, 0):
         return False
     z = contact.z
     for i in range(work.x.shape[0]):

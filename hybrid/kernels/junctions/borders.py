@@ -135,21 +135,27 @@ def push_node(system, l, i, force):
 def eliminate_right_side(system, l):
     """Carry the right-hand side of line l through its kept factors."""
     line_job, n = read(system.tables[l]), read(system.tables[l]).line.h.shape[0]
-    X_, x, o, joined = line_job.work.X, line_job.work.x, system.begins[l], system.joints[l, END] >= 0
-    begin = n + 1
+    o, joined, begin = system.begins[l], system.joints[l, END] >= 0, n + 1
     for i in range(n, -1, -1):
         if system.marks[o + i] != 0:
             begin = i
     if begin > n:
         return
-    carry_given(X_, line_job.work.W, system.marks[o:], x, joined, begin)
+    carry_given(line_job.work.X, line_job.work.W, system.marks[o:], line_job.work.x, joined, begin)
+    hand_on(line_job.work, joined, begin)
+
+
+@inner
+def hand_on(work, joined, begin):
+    """A right-hand side that is carried from block `begin` on stands where the substitution finds it."""
+    n = work.x.shape[0] - 1
     for i in range(begin, n + 1):
         for k in range(SIZE):
-            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k]
+            work.X[i * ROW + k * SPAN + SPAN - 1] = work.x[i, k]
     if joined:
-        at = last_block(X_, n)
+        at = last_block(work.X, n)
         for k in range(SIZE):
-            X_[at + 64 + k] = x[n, k]
+            work.X[at + 64 + k] = work.x[n, k]
 
 
 @inner

@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.block_elimination import ROW, SIZE, SPAN
+from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, sweep
+from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.contact.self_contact import contact_task, energy_without_weight, is_gain, is_judged, work_of_try
 from hybrid.kernels.contact.self_contact import read as read_contact
 from hybrid.kernels.contact.self_contact_law import FOOT_PLACE, PLACE, P, Q, add_gradient, add_held, arc_length
@@ -54,13 +55,13 @@ from hybrid.kernels.junctions.borders import (
     PREDICT,
     SAFE_PART,
     SPECTRAL_RADIUS,
-    START,
     add_corrections,
     answer_right_sides,
-    is_fixed,
+    clear_right_side,
+    hand_on,
     keep_corrections,
+    push_node,
 )
-from hybrid.kernels.junctions.joined_lines import last_block
 from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.machine.compile import called, inner, kernel
@@ -342,40 +343,26 @@ def first_in_contact(contact, first, n):
 
 
 @inner
-def set_right_side(l, line_job, contact, first, joints, touches, exactly):
-    """The right-hand side of an eliminated line: forces contact.y on the nodes in contact, or nothing.
+def set_right_side(system, l, contact, first, touches, exactly):
+    """The right-hand side of the eliminated line l: forces contact.y on the nodes in contact, or nothing.
 
     first: where its nodes begin in contact; exactly: not by way of `sweep`.
     """
-    work, n, ends = line_job.work, line_job.line.h.shape[0], line_job.ends
-    x, X_, joined = work.x, work.X, joints[l, END] >= 0
-    if joints[l, START] >= 0:
-        for a in range(3):
-            work.rows[0, (a + 1) * 24 + 23] = 0.0
+    clear_right_side(system, l)
+    line_job = read(system.tables[l])
+    work, n, joined = line_job.work, line_job.line.h.shape[0], system.joints[l, END] >= 0
     begin = first_in_contact(contact, first, n) if touches else n + 1
     for i in range(begin, n + 1):
-        for j in range(SIZE):
-            x[i, j] = 0.0
-        if contact.marks[first + i] == 0:
-            continue
-        if i == 0 and joints[l, START] >= 0:  # the march has replaced its balance by its place
-            for a in range(3):
-                work.rows[0, (a + 1) * 24 + 23] = contact.y[first, a]
-        elif not is_fixed(ends, i, n):
-            for j in range(3):
-                x[i, 1 + j] = contact.y[first + i, j]
-        x[i, 4] = contact.y[first + i, 3] * contact.rolls[first + i]
-    if begin <= n and exactly:
-        carry_given(X_, work.W, contact.marks[first:], x, joined, begin)
-    elif begin <= n:
-        sweep(X_, work.W, contact.sweep[first:], contact.marks[first:], x, joined, begin)
-    for i in range(n + 1):
-        for k in range(SIZE):
-            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k] if i >= begin else 0.0
-    if joined:
-        o = last_block(X_, n)
-        for k in range(SIZE):
-            X_[o + 64 + k] = x[n, k] if n >= begin else 0.0
+        if contact.marks[first + i] != 0:
+            push_node(system, l, i, get3(contact.y, first + i))
+            work.x[i, 4] = contact.y[first + i, 3] * contact.rolls[first + i]
+    if begin > n:
+        return
+    if exactly:
+        carry_given(work.X, work.W, contact.marks[first:], work.x, joined, begin)
+    else:
+        sweep(work.X, work.W, contact.sweep[first:], contact.marks[first:], work.x, joined, begin)
+    hand_on(work, joined, begin)
 
 
 @called
@@ -389,7 +376,7 @@ def respond(system, job, with_gradient):
         contact = read_contact(job.contacts[lead]).contact
         if job.shared[l, 0] >= 0:
             touches = contact.counts.points > 0
-        set_right_side(l, read(system.tables[l]), contact, job.shared[l, 1], system.joints, touches, with_gradient)
+        set_right_side(system, l, contact, job.shared[l, 1], touches, with_gradient)
     return answer_right_sides(system, job.rank)
 
 

@@ -56,7 +56,7 @@ class NetworkJob(NamedTuple):
     still: Blocks  # (L, 2, 3) zeros: gaps of those
     moves: Floats  # (3,) of corrections, as kernels.junctions.borders has it
     begins: NDArray[np.int64]  # (L,) where nodes of lines begin among those of all
-    marks: NDArray[np.int64]  # (T,) nodes with another right-hand side; empty: nothing needs one
+    marks: NDArray[np.int64]  # (T,) nodes with another right-hand side
     rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
     phase: NDArray[np.int64]  # (1,) what is asked of borders (kernels.junctions.borders)
     near: NDArray[np.int64]  # (L,) of all lines, how near they are to what is free (kernels.junctions.network_job)

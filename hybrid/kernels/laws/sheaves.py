@@ -20,21 +20,16 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
-from hybrid.kernels.laws.obstacles import carry_obstacles, normal_force, row3, row9, way_along
+from hybrid.kernels.laws.obstacles import normal_force, row3, row9, way_along
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import (
     ALGORITHMIC,
-    ALONE,
     ANGLE,
-    BEARING,
     EACH,
     ENDED,
     FREE,
     FRICTION,
-    INERTIA,
-    LEFT_OVER,
     MU,
     ROLLED,
     ROLLED_BEFORE,
@@ -44,7 +39,6 @@ from hybrid.kernels.state.report import (
     STILL_AXIS,
     TRUE,
     TURNED,
-    YIELDING,
 )
 
 
@@ -121,68 +115,12 @@ def along(q, x):
 
 
 @inner
-def turn_along(carried, rolling, count, x):
-    """Put the first `count` sheaves into a correction x (N+1, 5) that was found without them."""
-    j = 0
-    for k in range(carried.shape[0]):
-        if carried[k, INERTIA] > 0.0:
-            if j < count and carried[k, YIELDING] != 0.0:
-                z = rolling[3 * j + 1]
-                change = -along(rolling[3 * j + 2], x) / carried[k, YIELDING]
-                for i in range(z.shape[0]):
-                    for c in range(5):
-                        x[i, c] += change * z[i, c]
-            j += 1
-
-
-@kernel
-def turn_with(line, sea, ends, r, state, work, cv, ca):
-    """Put sheaves into a correction that was found without them.
-
-    r: (N+1, 3) m, before the step.
-    """
-    j, last = 0, work.x.shape[0] - 1
-    for k in range(line.moved.shape[0]):
-        if line.moved[k] != FREE:
-            continue
-        b, z, q = sea.rolling[3 * j], sea.rolling[3 * j + 1], sea.rolling[3 * j + 2]
-        moment, slope = moments(line, sea, r, work.u, state, k, b, q, cv)
-        for end in range(2):
-            if ends.held[end]:
-                for i in range(5):
-                    b[end * last, i] = q[end * last, i] = 0.0
-        inertia, bearing = sea.carried[k, INERTIA], sea.carried[k, BEARING]
-        left = moment - inertia * state.sheave[k, TRUE] - bearing * state.sheave[k, SPIN]
-        solve_again(work.X, work.W, b, z)
-        turn_along(sea.carried, sea.rolling, j, z)
-        sea.carried[k, LEFT_OVER], sea.carried[k, ALONE] = left, slope - inertia * ca - bearing * cv
-        sea.carried[k, YIELDING] = along(q, z) + sea.carried[k, ALONE]
-        change = -(left + along(q, work.x)) / sea.carried[k, YIELDING]
-        for i in range(z.shape[0]):
-            for c in range(5):
-                work.x[i, c] += change * z[i, c]
-        j += 1
-
-
-@inner
 def roll_sheave(sea, new, k, change, cv, ca):
     """Sheave k turns by a change, rad."""
     new.sheave[k, ANGLE] += change
     new.sheave[k, SPIN] += cv * change
     new.sheave[k, TRUE] += ca * change
     sea.carried[k, ROLLED], sea.carried[k, ROLLING] = new.sheave[k, ANGLE], new.sheave[k, SPIN]
-
-
-@kernel
-def roll_on(line, sea, new, s, part, x):
-    """Sheaves turn with the part that is made of the correction x (N+1, 5)."""
-    j = 0
-    for k in range(line.moved.shape[0]):
-        if line.moved[k] == FREE:
-            change = -part * (sea.carried[k, LEFT_OVER] + along(sea.rolling[3 * j + 2], x)) / sea.carried[k, ALONE]
-            roll_sheave(sea, new, k, change, s.cv, s.ca)
-            j += 1
-    carry_obstacles(sea.now[0] - s.dt, sea.now[0], sea)
 
 
 @kernel

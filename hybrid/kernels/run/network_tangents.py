@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE
 from hybrid.kernels.algebra.kept_factors import carry_block, solve_with
 from hybrid.kernels.algebra.plane import solve_again_planar
 from hybrid.kernels.algebra.rotations import (
@@ -50,9 +50,8 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
     rotation,
 )
-from hybrid.kernels.junctions.borders import END, answer_right_sides
+from hybrid.kernels.junctions.borders import END, answer_right_sides, hand_on
 from hybrid.kernels.junctions.borders import START as BEGIN
-from hybrid.kernels.junctions.joined_lines import last_block
 from hybrid.kernels.junctions.network_job import read_system, task_of
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
@@ -304,12 +303,7 @@ def set_right_side(line_work, job, other, starts, ends):
         for k in range(1, SIZE):
             x[i, k] = b[i, k]
         carry_block(X_, line_work.W, x, i, i, n, 0, not (ends and i == n))
-        for k in range(SIZE):
-            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k]
-    if ends:
-        o = last_block(X_, n)
-        for k in range(SIZE):
-            X_[o + 64 + k] = x[n, k]
+    hand_on(line_work, ends, 0)
 
 
 @inner

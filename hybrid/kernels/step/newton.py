@@ -11,13 +11,14 @@ What is beside the band of the line is a border.  Newton asks all of them a ques
 named here, and in this order; of a line that does not have it each costs a comparison.  The Newton of joined lines
 (kernels.run.network) asks the same functions of each line where no border of joined lines takes their place.
 
-    border                     prepare       before_march     after_march  couple      safe_part  move_borders  carry
-    torque through catenaries                torques                       correction                           powers
-    law of length                            linearised                                                         means
-    layers that slip                         what they bear                                                     slip
+    border                     prepare       before_march     after_march  couple      safe_part  carry
+    torque through catenaries                torques                       correction             powers
+    law of length                            linearised                                           means
+    layers that slip                         what they bear                                       slip
     winch                                    nodes that ride  length
-    sheaves                                                                angles                 angles
-    contact with itself        part, radius                                forces      part                     energy
+    contact with itself        part, radius                                forces      part       energy
+
+Sheaves that turn freely are borders of all lines (kernels.junctions.sheaves_and_winches): a line by itself has none.
 
 The powers of torques and the energy of contact are of a step that is found alone (`solve`, `end_line_step`).
 """
@@ -33,7 +34,6 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.block_elimination import substitute
 from hybrid.kernels.algebra.plane import substitute_planar
 from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
-from hybrid.kernels.laws.sheaves import roll_on, turn_with
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, caller_of_six, reader
 from hybrid.kernels.march.assembly_plane import march_planar
@@ -188,7 +188,6 @@ class Job(NamedTuple):
     contact_table: NDArray[np.int64]  # of a kernels.contact.self_contact.ContactJob
     reel_table: NDArray[np.int64]  # of a kernels.reel.payout.ReelJob, of a line that is paid out
     itself: int = 0  # address of kernels.contact.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
-    solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     reel: int = 0  # address of kernels.reel.payout.pay_out, of a line of several stand_among; 0: its length stays
     iterated: int = 0  # of a run: address of kernels.reel.payout.iterate; 0: iterations need nothing of it
     quantities: int = 0  # address of kernels.watch.named_quantities.note_quantities; 0: none are asked for
@@ -313,9 +312,6 @@ def after_march(job, what):
 def couple(space, job, states, s, what, good):
     """Put borders into a correction that was found without them, and is `good` if it is finite; False: that fails."""
     pass_torque(space, job, states.new, CORRECT, s.cv)
-    if space is not None:
-        if states.new.sheave.shape[0] > 0 and what == STEP:
-            turn_with(job.line, job.sea, job.ends, states.old.r, states.new, job.work, s.cv, s.ca)
     if good and what != CORRECTION and touches(job):
         return ask_contact(job, TOUCH) > 0.0
     return True
@@ -325,14 +321,6 @@ def couple(space, job, states, s, what, good):
 def safe_part(job):
     """The part of a correction that is safe."""
     return ask_contact(job, LIMIT) if touches(job) else 1.0
-
-
-@inner
-def move_borders(space, job, new, s, part, what):
-    """Their unknowns move by the part of the correction that is made."""
-    if space is not None:
-        if new.sheave.shape[0] > 0 and what == STEP:
-            roll_on(job.line, job.sea, new, s, part, job.work.x)
 
 
 @inner
@@ -452,7 +440,6 @@ def solve(plane, space, task, job, states):
             break
         part, size, where = find_part(task, job, new, s, it, noise)
         update(plane, space, line, new, s.cv, s.ca, part, task.turning, work)
-        move_borders(space, job, new, s, part, task.what)
         outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
         before = size if part == 1.0 else math.inf
     cut_short = task.cut and outcome == NOT_CONVERGED and it == task.limits.most and before < math.inf
