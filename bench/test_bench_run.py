@@ -22,7 +22,7 @@ from problems import StepsOfLine, at_rest
 
 import hybrid
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.entry import NO_PUSH, workspace_of
 from hybrid.kernels.step.step import States
 from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build, planar, untwist
@@ -30,7 +30,7 @@ from hybrid.outputs import observed_states
 from hybrid.scene.read import one_line
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stability import seed
-from hybrid.solve.stepper import MOST_ITERATIONS, REACH, workspace_of
+from hybrid.solve.stepper import MOST_ITERATIONS, REACH
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"

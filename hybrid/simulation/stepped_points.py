@@ -38,7 +38,7 @@ from hybrid.simulation.stepped import (
     triple,
     vector,
 )
-from hybrid.solve.stepper import LineFailed, workspace_of
+from hybrid.solve.stepper import LineFailed
 
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9
@@ -496,7 +496,7 @@ def interface_stiffness(model: Model, k: int, states: tuple[State, State], taken
     ends = model.ends.values
     held = ends.held.copy()
     held[k] = 0
-    work = workspace_of(line, keep=True)
+    work = entry.workspace_of(line, keep=True)
     old, new = states
     work.u[:] = new.r - old.r if taken.dt > 0.0 else 0.0
     bad = entry.assembly_of_step(line, model.sea.values, ends._replace(held=held), old, new, cv, ca, work)

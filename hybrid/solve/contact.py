@@ -28,34 +28,16 @@ from hybrid.kernels.contact.self_contact_law import (
     P,
     Q,
 )
-from hybrid.kernels.contact.self_contact_pairs import (
-    SHARES,
-    SLIP_WITHIN,
-    WINDOW,
-    Contact,
-    blank_contact,
-)
+from hybrid.kernels.contact.self_contact_pairs import SHARES, SLIP_WITHIN, WINDOW, Contact, blank_contact
 from hybrid.kernels.junctions.lines_contact import MEETING, MET, MET_OTHER, MET_S, blank_shared_job, shared_task
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import block_rows, out_of_balance
+from hybrid.kernels.run.entry import block_rows, out_of_balance, workspace_of
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FORCE_A, NET_A, ROTARY, SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import (
-    Ends,
-    Floats,
-    Line,
-    Sea,
-    State,
-    Work,
-    blank_line,
-    blank_state,
-    no_ends,
-    no_work,
-)
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends, no_work
 from hybrid.kernels.step.newton import ADDRESS, ASKED, NEAR, REST, SHARED
 from hybrid.model.contents import Touching
-from hybrid.solve.stepper import workspace_of
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
 # there are: pieces of the same length, in whatever unit, have as many.

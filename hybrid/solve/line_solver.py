@@ -11,14 +11,14 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.laws.soil import rest_in_soil
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import NO_PUSH, Limits
+from hybrid.kernels.run.entry import NO_PUSH, Limits, workspace_of
 from hybrid.kernels.state.report import FRICTION, OBSTACLES, RESIDUAL, RESIDUAL_NODE, USED_RHO
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.step import States, friction_axes
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.stability import DAMPING, Stability, stop
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
-from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, NetworkTaken, Solution, workspace_of
+from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, NetworkTaken, Solution
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 # An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.

@@ -20,6 +20,7 @@ from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PL
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.run.entry import workspace_of
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
 from hybrid.kernels.state.report import (
     FRICTION,
@@ -41,7 +42,7 @@ from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.line_jobs import LineJobs
 from hybrid.solve.line_solver import BALANCED, BALANCING, CLOSER, MOST_ITERATIONS
 from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING
-from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, lie_on_bed, workspace_of
+from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, lie_on_bed
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.

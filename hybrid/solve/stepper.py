@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -26,18 +25,10 @@ from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.seabed import normal_forces, planes_under
 from hybrid.kernels.laws.soil import soil_at_rest
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import block_rows, out_of_balance
-from hybrid.kernels.state.report import (
-    FREE,
-    FRICTION,
-    PLANAR,
-    SEABED_ENERGY,
-    SOIL,
-    WAVES,
-)
-from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends
+from hybrid.kernels.run.entry import block_rows, out_of_balance, workspace_of
+from hybrid.kernels.state.report import FRICTION, SEABED_ENERGY, SOIL, WAVES
+from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step.step import friction_axes
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
@@ -101,24 +92,6 @@ def hold_by_friction(line: Line, sea: Sea, ends: Ends, state: State) -> None:
     force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
     friction_axes(sea, state.r, state.e, state.slip, state.grip)
     state.slip[:] = static_friction_travel(line, sea, state.r, force)
-
-
-# Work arrays of a line; the address of what passes torques through its zones takes a millisecond to find: once.
-
-
-@cache
-def _torque_address() -> int:
-    """Of kernels.march.zone_torque.pass_torque, the same for all lines, whose arrays have the same types."""
-    return int(pass_torque.address(blank_line(1), no_ends(), blank_state(1), entry.workspace(1), 0, 0.0))
-
-
-def workspace_of(line: Line, keep: bool = False) -> Work:
-    """As kernels.run.entry.workspace_of; keep: factors stay, as they do where sheaves turn with the line."""
-    keep = keep or bool((line.moved == FREE).any())
-    if not line.torsion.size or line.bits & PLANAR:
-        return entry.workspace_of(line, keep)
-    work = entry.workspace_of(line._replace(torsion=line.torsion[:0]), keep=True)
-    return work._replace(torsion=torsion_of(line, keep)._replace(address=_torque_address()))
 
 
 class JoinedLine(NamedTuple):

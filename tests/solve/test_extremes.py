@@ -16,10 +16,9 @@ from scipy.linalg import solve_banded
 
 import hybrid
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.run.entry import block_rows, correction
+from hybrid.kernels.run.entry import block_rows, correction, workspace_of
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
-from hybrid.solve.stepper import workspace_of
 from tests.scenes import cable_scene, pinned_at
 
 LENGTH, FAR = 1000.0, 1000.0

@@ -8,6 +8,7 @@ a table of addresses (kernels.machine.binding).
 from __future__ import annotations
 
 import threading
+from functools import cache
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from hybrid.kernels.state.state import (
     Sea,
     State,
     Work,
+    blank_line,
     blank_state,
     no_ends,
     no_torsion,
@@ -139,11 +141,14 @@ def workspace_of(line: Line, keep: bool = False) -> Work:
     if line.tension_twist.size:
         work = work._replace(couple=np.zeros((line.s.size, COUPLES)))
     if line.torsion.size and not line.bits & PLANAR:
-        torsion = torsion_of(line, keep)
-        work = work._replace(torsion=torsion)
-        address = pass_torque.address(line, no_ends(), blank_state(line.h.size), work, 0, 0.0)
-        work = work._replace(torsion=torsion._replace(address=address))
+        work = work._replace(torsion=torsion_of(line, keep)._replace(address=_torque_address()))
     return work
+
+
+@cache
+def _torque_address() -> int:
+    """Of what passes torques through zones, the same for all lines; it takes a millisecond to find: once."""
+    return int(pass_torque.address(blank_line(1), no_ends(), blank_state(1), workspace(1), 0, 0.0))
 
 
 def workspace(n_cells: int, keep: bool = False) -> Work:
