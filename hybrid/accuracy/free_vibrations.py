@@ -76,7 +76,8 @@ def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Ma
     quiet = max((x for x in begins if x is not None), default=0.0)
     fluid = asked.environment.fluid
     still = fluid is None or fluid.waves is None
-    if not begins or None in begins or not still or asked.starts_as_placed or len(times) < 2:
+    rests = still and not (asked.starts_as_placed or asked.may_break)
+    if not begins or None in begins or not rests or len(times) < 2:
         return {}
     try:
         found = rest()
@@ -92,11 +93,10 @@ def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Ma
 def _is_steady(rest: Rest) -> bool:
     """Whether nothing but motions of ends excites a network, and all that damps it is known."""
     for model in rest.models:
-        moves, ends = model.ends.moves(), model.ends
+        moves = model.ends.moves()
         towed = moves.velocity.any() and bool(model.line.bits & (DRAG | BODIES))  # the drag of the tow is not known
-        let_go = np.isfinite([*ends.release_times, *ends.release_forces]).any()
         loses = model.line.bits & (BENDING_SLIP | SOIL)  # as much as the size of the motion decides
-        if model.payout is not None or len(moves.loads) or let_go or towed or loses:
+        if model.payout is not None or len(moves.loads) or towed or loses:
             return False
     return not any(x.loads or x.members is not None for x in rest.floats)
 

@@ -10,7 +10,6 @@ cable is the network of one line.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -173,14 +172,14 @@ def lie_in(plane: Floats, model: Model) -> bool:
 
 def unknown_of(model: Model) -> dict[str, bool]:
     """What kernels of tangents do not know of a line, and whether it has that."""
-    line, ends = model.line, model.ends
+    line = model.line
     return {
         "the line may touch itself": bool(line.bits & SELF_CONTACT),
         "vortices follow the motion": bool(line.bits & VORTICES),
         "tension is no multiple of strain": line.law.size > 0,
         "layers slip": line.slip_law.size > 0, "tension makes a torque": line.tension_torque.size > 0,
         "a torque passes through catenary zones": line.torsion.size > 0, "obstacles move": line.moved.size > 0,
-        "loads change in the run": bool(ends.breaks) or min(ends.release_times) < math.inf,
+        "loads change in the run": bool(model.ends.breaks),
         "friction of the bed": bool(line.bits & FRICTION), "soil remembers": bool(line.bits & SOIL),
     }  # fmt: skip
 

@@ -24,7 +24,6 @@ from hybrid.scene.motion import MotionTerms
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
 SAME_DIRECTION = 1e-6
 CONSTANT: Floats = np.zeros((0, 4))  # history of a load that has none
-NEVER = (np.inf, np.inf), (np.inf, np.inf)  # time and force at which the start and the end are let go
 
 
 def first_director(tangent: Sequence[float], normal: Sequence[float] | None = None) -> Floats:
@@ -166,9 +165,7 @@ class EndConditions:
         frame: Floats,
         loads: Sequence[EndLoad],
         motions: Mapping[int, Motion | DrivenEnd],
-        release: tuple[Sequence[float], Sequence[float]] = NEVER,
     ) -> None:
-        """release: times (s) and end forces (N) at which the ends are let go; infinite: never."""
         zero = np.zeros((2, 3))
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
         self.velocity = np.zeros((2, 3))
@@ -178,7 +175,6 @@ class EndConditions:
         self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
         self._bring_in = 1.0  # s
         self._moves: Moves | None = None  # made when first asked for
-        self.release_times, self.release_forces = release
         self.released = np.zeros(2, int)  # 1 where an end was held and has been let go
         self._set: set[tuple[str, int]] = set()  # loads that are set from outside
         self._paths = np.zeros((2, PATH))  # of ends that are set from outside
@@ -219,8 +215,7 @@ class EndConditions:
         held, position = self.values.held.tolist(), self.values.position.copy()
         held[k], position[k] = 0, 0.0
         motions = {j: motion for j, motion in self.motions.items() if j != k}
-        release = self.release_times, self.release_forces
-        out = EndConditions(held, position, self._given[0], self._loads, motions, release)
+        out = EndConditions(held, position, self._given[0], self._loads, motions)
         out.released[:] = self.released
         out.released[k] = 1
         out._turns, out._bring_in = {j: x for j, x in self._turns.items() if j != k}, self._bring_in

@@ -423,10 +423,7 @@ def end_conditions(
                 where = f"ends.{('start', 'end')[k]}"
                 raise SceneError([replace(x, where=f"{where}.{x.where}") for x in error.complaints]) from None
     held = [end.held_position is not None for end in scene.ends.both]
-    when = [end.release for end in scene.ends.both]
-    times = [x.time if x is not None and x.time is not None else np.inf for x in when]
-    forces = [x.tension if x is not None and x.tension is not None else np.inf for x in when]
-    return EndConditions(held, position, frame, loads, motions, (times, forces))
+    return EndConditions(held, position, frame, loads, motions)
 
 
 # Why a scene may have no equilibrium, or none that a flexible line can hold: for messages of a failed search.

@@ -199,7 +199,7 @@ class LineResult:
         right[marked] = nodes + np.arange(marked.size)
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
-        books.clock.least_peak = books.clock.release_start = books.clock.release_end = np.inf
+        books.clock.least_peak = np.inf
         books.counts.stiff, books.counts.varies = self.model.inextensible, self.model.layout is not None
         books.clock.rho = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         books.clock.wave_step = wave_step(line, self.model.tension_scale)

@@ -60,8 +60,6 @@ class Clock(NamedNumbers):
     slack_step: float  # of the last step that was; 0: none was
     mute_slack: float  # 1 when an event has told of that
     correction: float  # of the last try: next correction of Newton's method, as predicted
-    release_start: float  # N, force at which an end is let go; infinity: never
-    release_end: float
     near_plane: float  # m, distance from its plane below which a line in space has come back to it; 0: it never does
     longest: float  # of the accepted steps so far
 
@@ -126,7 +124,6 @@ STEPS_CUT = 64  # as something turned too far
 STEPS_SLACK = 128  # as a cell was slack
 IS_BENT = 512  # so far that the line may come near itself
 MEETS_ITSELF = 1024
-LETS_GO = 2048  # at an end whose tension is above its limit
 ITERATIONS_CUT = 4096  # a try was taken that had not converged
 NEARS_PLANE = 8192
 NEARS_ITSELF = 16384

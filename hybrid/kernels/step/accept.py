@@ -6,7 +6,6 @@ import math
 
 from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.march.energies import pull
 from hybrid.kernels.march.zone_torque import POWER
 from hybrid.kernels.state.books import (
     BENT,
@@ -14,7 +13,6 @@ from hybrid.kernels.state.books import (
     ITERATIONS_CUT,
     JUMPED,
     LEAVES_PLANE,
-    LETS_GO,
     NEARS_PLANE,
     PUSH_DIED,
     SLACKENED,
@@ -179,10 +177,6 @@ def watch(line, ends, old, new, books, report, t, dt):
         flags |= SLACKENED
     if clock.near_plane > 0.0 and is_near_plane(line, new, clock.near_plane):
         flags |= NEARS_PLANE
-    if pull(report, 0) > clock.release_start:
-        flags |= LETS_GO
-    if pull(report, 1) > clock.release_end:
-        flags |= LETS_GO
     return flags
 
 
