@@ -17,8 +17,8 @@ from hybrid.model.build import Model
 from hybrid.model.line import with_spin_inertia
 from hybrid.model.mesh import LineOnBase
 from hybrid.model.network import NetworkModel
+from hybrid.scene.ends import Failure
 from hybrid.scene.network import Network
-from hybrid.scene.points import Failure
 
 
 class Weakness(NamedTuple):

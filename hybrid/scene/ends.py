@@ -168,18 +168,15 @@ TWISTED_BY = (
 _LOADS: dict[str, Literal["force", "moment"]] = {"force": "force", "moment": "moment", "thrust": "force"}
 
 
-class Release(Table):
-    """When a held end is let go: at a time, or after the first step with so large a force; whichever comes first."""
+class Failure(Table):
+    """When what holds a line gives way: at a time, or after the first step with so large a force, as comes first."""
 
-    time: Positive | None = Field(default=None, description="time at which it is let go [s]")
-    tension: Positive | None = Field(
-        default=None, description="force between the end and what holds it at which it is let go [N]"
-    )
+    time: Positive | None = Field(default=None, description="time at which it gives way [s]")
+    tension: Positive | None = Field(default=None, description="force at which it gives way [N]")
 
     def _check_says_when(self) -> Findings:
         if self.time is None and self.tension is None:
-            fix = "time: 12 (s) or tension: 50e3 (N), or leave release_at out"
-            yield [Finding((), "time or tension", fix)]
+            yield [Finding((), "time or tension", "time: 12 (s) or tension: 50e3 (N), or leave it out")]
 
 
 BEND_STIFFNESS = (
@@ -285,9 +282,9 @@ class EndTable(Table):
         return motion
 
     @property
-    def release(self) -> Release | None:
+    def release(self) -> Failure | None:
         """When what is held is let go."""
-        release: Release | None = self._value_of("release_at")
+        release: Failure | None = self._value_of("release_at")
         return release
 
     @property
@@ -324,7 +321,7 @@ class Pinned(EndTable):
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
     payout: Payout | None = Field(default=None, description=PAYOUT)
-    release_at: Release | None = Field(default=None, description=_RELEASE)
+    release_at: Failure | None = Field(default=None, description=_RELEASE)
 
     def _check_turning_is_free(self) -> Findings:
         if self.motion is not None:
@@ -345,7 +342,7 @@ class Clamped(EndTable):
     bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
     payout: Payout | None = Field(default=None, description=PAYOUT)
-    release_at: Release | None = Field(default=None, description=_RELEASE)
+    release_at: Failure | None = Field(default=None, description=_RELEASE)
 
     @property
     def holds_twist(self) -> bool:

@@ -23,7 +23,7 @@ from hybrid.scene.base import (
     Vector,
     parallel,
 )
-from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, AtPoint, Body, Free, Payout, moved_guides
+from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY, AtPoint, Body, Failure, Free, Payout, moved_guides
 from hybrid.scene.motion_tables import GivenLoad, Loading, Motion, Triple
 
 _BREAK = (
@@ -50,18 +50,6 @@ def _a_name(name: str) -> str:
 
 
 Name = Annotated[Text, After(_a_name)]
-
-
-class Failure(Table):
-    """When something breaks: at a time, or after the first step with so large a force; whichever comes first."""
-
-    time: Positive | None = Field(default=None, description="time at which it breaks [s]")
-    tension: Positive | None = Field(default=None, description="force at which it breaks [N]")
-
-    def _check_says_when(self) -> Findings:
-        if self.time is None and self.tension is None:
-            fix = "time: 12 (s) or tension: 50e3 (N), or leave break_at out"
-            yield [Finding((), "time or tension", fix)]
 
 
 class FixedPoint(Table):

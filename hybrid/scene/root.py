@@ -37,11 +37,11 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted, refuse
 from hybrid.scene.cable import Contact
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned, Release
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import findings_of
-from hybrid.scene.points import ClampedConnection, Connection, Failure, FreePoint, Point
+from hybrid.scene.points import ClampedConnection, Connection, FreePoint, Point
 from hybrid.scene.schema import CableScene, LineScene, standard_schema
 
 LINE = "cable"
@@ -188,7 +188,7 @@ def _point_of(end: End) -> tuple[dict[str, Any], dict[str, Any]]:
     kind, called, connected = POINTS[end.kind]
     given = {key: getattr(end, key) for key in type(end).model_fields if key != "kind"}
     given = {key: x for key, x in given.items() if x is not None}
-    point = {called.get(key, key): _table(x) for key, x in given.items() if key not in connected}
+    point = {called.get(key, key): x for key, x in given.items() if key not in connected}
     held = {key: x for key, x in given.items() if key in connected}
     return {"kind": kind} | point, {"kind": "clamped" if "tangent" in held else "pinned"} | held
 
@@ -200,15 +200,8 @@ def _end_of(point: Point, held: Connection) -> End:
     _, called, connected = POINTS[made.model_fields["kind"].default]
     keys = [key for key in made.model_fields if key != "kind"]
     given = {key: getattr(held if key in connected else point, called.get(key, key)) for key in keys}
-    if isinstance(when := given.get("release_at"), Failure):
-        given["release_at"] = Release(time=when.time, tension=when.tension)
     end: End = made(**given)
     return end
-
-
-def _table(value: Any) -> Any:
-    """When an end is let go, as a point says it; all else as it is."""
-    return Failure(time=value.time, tension=value.tension) if isinstance(value, Release) else value
 
 
 def _output(output: Output) -> dict[str, Any]:
