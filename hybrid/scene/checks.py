@@ -250,7 +250,7 @@ def _touches_obstacles(cable: Cable, obstacles: Obstacles, ends: Ends) -> Iterat
                     yield Finding(("ends", end, key), expected, "move it, or the obstacle")
 
 
-def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
+def accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
     if accuracy is not None and output.errors is False:
         expected = "true or nothing, because accuracy is judged by the error figure"
         yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
@@ -434,7 +434,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _stretches_on_cable,
     _laws_on_a_reel,
     _tolerance_is_felt,
-    _accuracy_has_errors,
+    accuracy_has_errors,
     elevation_has_waves,
     _quantities,
     _pressure_of_pipes,

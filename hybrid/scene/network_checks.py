@@ -9,10 +9,10 @@ from dataclasses import replace
 from itertools import chain, combinations
 from typing import Any
 
-from hybrid.scene.analysis import Equilibrium
+from hybrid.scene.analysis import Accuracy, Equilibrium
 from hybrid.scene.base import Finding, Place, nearest
 from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.checks import contradictions, elevation_has_waves, without_diameter
+from hybrid.scene.checks import accuracy_has_errors, contradictions, elevation_has_waves, without_diameter
 from hybrid.scene.combinations import holds_rod, refused, tables_of
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
@@ -38,6 +38,7 @@ def findings_of(system: Network) -> Iterator[Iterator[Finding]]:
     yield _in_a_plane(system)
     yield travel_findings(system)
     yield elevation_has_waves(system.output, system.environment)
+    yield accuracy_has_errors(_accuracy_asked(system), system.output)
     yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
 
 
@@ -179,6 +180,13 @@ def _moment_findings(system: Network, name: str) -> Iterator[Finding]:
         yield from _load_findings(system, ends, system.lines[line], ("points", name))
 
 
+def _accuracy_asked(system: Network) -> Accuracy | None:
+    """What is asked of all lines, or of one; a chosen model brings along that of steps that follow the motion."""
+    follows = system.time is not None and system.time.controlled
+    of_lines = () if follows else (line.accuracy for line in system.lines.values())
+    return system.accuracy or next((x for x in of_lines if x is not None), None)
+
+
 def _load_findings(system: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
     """What is wrong with motions and loads of ends that stand for what is at another place of the system."""
     tables = {"ends": ends, "time": system.time, "cable": line.cable, "environment": system.environment}
@@ -190,7 +198,7 @@ def _load_findings(system: Network, ends: Ends | None, line: JoinedLine, at: Pla
 def contradictions_of(system: Network, name: str, carrying: Sequence[str] = ()) -> list[Finding]:
     """What contradicts in a line, each under the key that the short form has for it; carrying: as of `scene_of`."""
     tables = dict(vars(system.scene_of(name, carrying)))
-    if system.output.errors is False:  # nobody has asked for an accuracy, or a chosen model has brought it along
+    if system.output.errors is False:  # that of all lines is judged by itself (`accuracy_has_errors`)
         tables["accuracy"] = None
     return contradictions(tables)
 

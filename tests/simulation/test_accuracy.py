@@ -24,7 +24,7 @@ from hybrid.model.mesh import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.analysis import amount
 from hybrid.scene.read import one_line
-from hybrid.scene.root import LINE
+from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.run_sample import RunSample, cubic_spline
 from tests.scenes import cable_scene, pinned_at
 
@@ -623,8 +623,15 @@ def test_what_steps_damp_out_is_said():
 
 
 def test_accuracy_needs_its_figure():
-    with pytest.raises(SceneError, match="error figure"):
+    """A cable and a network in the same words, whether it is asked of all lines or of one."""
+    with pytest.raises(SceneError, match="error figure") as of_cable:
         swinging(accuracy="1%", output={"errors": False})
+    network = in_full(swinging(output={"errors": False}, time={"duration": 6.0, "step": 0.1}))
+    tables = network.model_dump(mode="json", exclude_none=True)
+    for asked in ({"accuracy": "1%"}, {"lines": {LINE: tables["lines"][LINE] | {"accuracy": "1%"}}}):
+        with pytest.raises(SceneError) as of_network:
+            hybrid.validate_scene(tables | asked)
+        assert of_network.value.complaints == of_cable.value.complaints
 
 
 def test_a_given_model_is_not_computed_more_finely_for_its_own_error():
