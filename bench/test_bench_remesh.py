@@ -18,10 +18,11 @@ from test_bench_cells import CASES, TOUCHDOWN, from_file, scene_of
 
 import hybrid
 from hybrid.kernels.mesh.zone_step import Zones
+from hybrid.simulation import cell_changes
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.zones import change as zone_change
 from hybrid.zones.change import transfer_to
-from tests.inside import OnlyLine
+from tests.inside import OnlyLine, never_due
 
 pytestmark = pytest.mark.bench
 SEEDS, LEVELS = (1, 2, 3), ((40, 0.05), (80, 0.025), (160, 0.0125))  # base cells and steps, s
@@ -139,7 +140,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
         found.append((float(off), float(np.linalg.norm(state.v, axis=1).max())))
 
     def compiled(self: CellChanges, *given: Any) -> float:
-        k, n, parity = self.side, self.cells, int(self._owner.count.parity)
+        k, n, parity = self.side, self.cells, int(self._run.loop.counts.parity)
         booked = change(self, *given)
         to, m = self.side, self.cells
         note(self.line(k, n), self.state(k, parity, n), self.line(to, m), self.state(to, 0, m))
@@ -158,7 +159,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
 
     jobs: list[Any] = []
     monkeypatch.setattr(CellChanges, "change", compiled)
-    monkeypatch.setattr(CellChanges, "alone", False)
+    monkeypatch.setattr(cell_changes, "cells_due", never_due)
     monkeypatch.setattr(zone_change, "transfer_to", in_python)
     monkeypatch.setattr(zone_change, "begin_switch", begin)
     return found

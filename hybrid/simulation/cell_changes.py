@@ -46,7 +46,7 @@ def carries_all(model: Model, switching: ZoneSwitching) -> bool:
     line = model.line
     laws = line.torsion, line.tension_twist, line.law, line.bend_law, line.wake_law, line.moved
     bare = switching.compiled and model.payout is None and not any(x.size for x in laws)
-    return bare and bool(line.bits & PLANAR or not switching.manager.twisted)
+    return bare and bool(line.bits & PLANAR or not switching.zones.counts.holds_twist)
 
 
 class Cells(NamedTuple):

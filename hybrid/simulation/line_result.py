@@ -447,8 +447,8 @@ class LineResult:
         if self.shown is not None:
             self.shown(batch)
         if self.manager is not None and not self.model.line.torsion.size:
-            manager, t = self.manager, float(batch.t[-1])
-            self.diagnostics.torque(t, manager.torque * manager.compliance, manager.torque)
+            clock, t = self.manager.zones.clock, float(batch.t[-1])
+            self.diagnostics.torque(t, clock.torque * clock.compliance, clock.torque)
         if self._sampled:
             self._aside += [(self.model, x) for x in self._sampled]
             self._sampled = ()

@@ -227,7 +227,6 @@ BOTH, PAIRS = ((0,), (1,)), ((0, 0), (0, 1), (1, 0), (1, 1))  # sides; old sides
 class Remesh:
     """Changes of the cells of a line of a run, from one side of arrays to the other, with the solver of now."""
 
-    alone = True  # whether cells change without a return to Python
     beside: tuple[str, ...] = ()  # of the table of what moves beside the run, what depends on the cells
     most_waiting = 0  # lines whose outputs may wait
     per_node = 0  # numbers of a node that are kept for them, at most
@@ -329,7 +328,7 @@ class Remesh:
     @property
     def job(self) -> np.ndarray:
         """The table of kernels.mesh.remesh that the compiled steps get."""
-        self._at.alone, self._at.may_wait = self.alone, not self._run.asks_quantities and self._line.outputs_join
+        self._at.may_wait = not self._run.asks_quantities and self._line.outputs_join
         return self._table.numbers
 
     # --- arrays -------------------------------------------------------------------------------------

@@ -140,13 +140,13 @@ def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[in
     As of one cable (zones.at_start): where the two equilibria are further apart than the tolerance of a line
     criteria become stricter, and where that does not help zones stay rod.
     """
-    allowed = {k: manager.tolerance for k, manager in managers.items()}
+    allowed = {k: float(manager.zones.clock.tolerance) for k, manager in managers.items()}
     most, rest = _most_rod(model, found, managers, t)
     try:
         for part in STRICTER:
             for k, manager in managers.items():
                 manager.set_layout(model.models[k].zoned)
-                manager.tolerance = part * allowed[k]
+                manager.zones.clock.tolerance = part * allowed[k]
             answer = _within(model, found, managers, t)
             if answer is None:
                 break
@@ -157,7 +157,7 @@ def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[in
         held = True
     for k, manager in managers.items():
         manager.held |= held
-        manager.tolerance = allowed[k] if held else manager.tolerance
+        manager.zones.clock.tolerance = allowed[k] if held else manager.zones.clock.tolerance
         manager.set_layout(most.models[k].zoned)
     return most, rest
 

@@ -188,7 +188,7 @@ class ZoneSwitching:
         if how.outcome == Outcome.OK:
             if manager.user is not None:
                 manager.ask_user(line, tried, end)
-            cells = manager.cells_to_reject if manager.highest_ratio > REJECT_RATIO else NONE
+            cells = manager.cells_to_reject if self.zones.clock.highest_ratio > REJECT_RATIO else NONE
             why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
         elif how.outcome == Outcome.SLACK:
             cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= tried.T))
@@ -241,7 +241,7 @@ class ZoneSwitching:
             numbers=numbers, guided=self.guided,
         )  # fmt: skip
         begin_switch(self._switch_table.numbers)
-        if manager.twisted and not target.bits & PLANAR:
+        if self.zones.counts.holds_twist and not target.bits & PLANAR:
             carry_torque(line, target, ends, state, transfer.out, np.zeros(line.s.size + 1))
         manager.adopt_rods(new.rod, change, t)
         manager.set_layout(new)
@@ -311,7 +311,7 @@ def change_base(
     assert set(kept) <= set(OF_BASE)
     cells = {name: getattr(old, name)[of_cell] for name in OF_CELLS}
     known, relaxing = old.counts.known, old.counts.relaxing
-    age, recent_age = manager.age, manager.recent_age
+    age, recent_age = old.clock.age, old.clock.recent_age
     manager.zones = blank._replace(**kept)
     for name in ("below_since", "wait_factor", "released", "buffer"):
         setattr(manager, name, getattr(manager, name)[source])
@@ -322,4 +322,4 @@ def change_base(
     for name, x in cells.items():
         getattr(manager.zones, name)[:] = x
     manager.zones.counts.known, manager.zones.counts.relaxing = known, relaxing
-    manager.age, manager.recent_age = age, recent_age
+    old.clock.age, old.clock.recent_age = age, recent_age

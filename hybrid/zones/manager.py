@@ -121,30 +121,9 @@ def tidied(flags: np.ndarray, rod: np.ndarray, shortest: int) -> np.ndarray:
 
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
-CHECKPOINTED = (
-    "tolerance", "held", "ratios", "seen", "grown", "leaving", "ramp_factor", "below_since", "release_cause",
-    "wait_factor", "released",
-    "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
-    "kinked",
-)  # fmt: skip
-
-
-def _number(name: str, text: str) -> Any:
-    """A number of the clock of zones."""
-    return property(
-        lambda self: float(getattr(self.zones.clock, name)),
-        lambda self, x: setattr(self.zones.clock, name, x),
-        doc=text,
-    )
-
-
-def _flag(name: str, text: str) -> Any:
-    """A flag of zones."""
-    return property(
-        lambda self: bool(getattr(self.zones.counts, name)),
-        lambda self, x: setattr(self.zones.counts, name, x),
-        doc=text,
-    )
+CHECKPOINTED = ("held", "seen", "below_since", "release_cause", "wait_factor", "released", "kinked")
+OF_CLOCK = ("tolerance", "next_review", "total_twist", "age", "recent_age", "fastest")
+OF_ZONES = ("ratios", "grown", "leaving", "ramp_factor", "largest")
 
 
 # Arrays of `Zones` that are the same for every layout.
@@ -234,17 +213,6 @@ class DomainManager:
 
     # --- what the compiled run knows ----------------------------------------------------------------
 
-    tolerance = _number("tolerance", "Error of position, m.")
-    next_review = _number("next_review", "When the next review is due, s.")
-    highest_ratio = _number("highest_ratio", "Largest ratio among catenaries at the last evaluation.")
-    torque = _number("torque", "Torque, N m, that a rod from end to end would carry, where there is none.")
-    total_twist = _number("total_twist", "Turn of the ends against each other, rad.")
-    compliance = _number("compliance", "Turn per torque of all the line, rad per N m.")
-    age, recent_age = _number("age", "Of `past`, s."), _number("recent_age", "Of `recent`, s.")
-    fastest = _number("fastest", "By how much velocities of nodes differed of late, m/s.")
-    going, coming = _flag("going", "Some stiffness is ramped down."), _flag("coming", "Some is ramped up.")
-    twisted = _flag("holds_twist", "Both ends hold the twist.")
-
     @property
     def ratios(self) -> Floats:
         """(criteria, n), largest since the last review."""
@@ -318,13 +286,15 @@ class DomainManager:
     def checkpoint(self) -> dict[str, Any]:
         """State besides the layout."""
         zones = self.zones
-        of_zones = {name: getattr(zones, name) for name in ("ratios", "grown", "leaving", "ramp_factor", "largest")}
-        known = {name: getattr(zones, name) if self.past.size else np.zeros(0) for name in ("past", "recent")}
-        return {name: getattr(self, name) for name in CHECKPOINTED if name not in of_zones | known} | of_zones | known
+        found = {name: getattr(zones, name) if self.past.size else np.zeros(0) for name in ("past", "recent")}
+        found |= {name: float(getattr(zones.clock, name)) for name in OF_CLOCK} | {"going": bool(zones.counts.going)}
+        found |= {name: getattr(zones, name) for name in OF_ZONES}
+        return found | {name: getattr(self, name) for name in CHECKPOINTED}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Restore a checkpoint; ValueError: it is invalid."""
-        allowed, cells, zones = self.tolerance, self.base_of_cell.size, self.zones
+        cells, zones = self.base_of_cell.size, self.zones
+        allowed = float(zones.clock.tolerance)
         good = 0.0 < saved["tolerance"] <= allowed and saved["past"].shape == saved["recent"].shape in ((0,), (cells,))
         criterion, grown = saved["release_cause"][0], saved["grown"]
         if not (good and 0.0 <= criterion.min(initial=0.0) <= criterion.max(initial=0.0) < len(CRITERIA)):
@@ -332,12 +302,15 @@ class DomainManager:
         least = min(saved["age"], saved["recent_age"], saved["fastest"], *saved["largest"])
         if not (0.0 <= grown.min() <= grown.max() <= 1.0 and least >= 0.0):
             raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time or size")
+        for name in ("past", "recent"):
+            getattr(zones, name)[: saved[name].size] = saved[name]
+        for name in OF_ZONES:
+            getattr(zones, name)[:] = saved[name]
+        for name in OF_CLOCK:
+            setattr(zones.clock, name, saved[name])
+        zones.counts.going = saved["going"]
         for name in CHECKPOINTED:
-            if name in ("past", "recent"):
-                getattr(zones, name)[: saved[name].size] = saved[name]
-            elif name in OF_BASE:
-                getattr(zones, name)[:] = saved[name]
-            elif isinstance(there := getattr(self, name), np.ndarray):
+            if isinstance(there := getattr(self, name), np.ndarray):
                 there[:] = saved[name]  # in place: compiled reviews know where it is
             else:
                 setattr(self, name, saved[name])
@@ -357,7 +330,7 @@ class DomainManager:
         evaluate_criteria(self._table.numbers)
         if self.user is not None:
             self.ask_user(line, state, t)
-        return float(self.highest_ratio)
+        return float(self.zones.clock.highest_ratio)
 
     def release(self, k: int, cable: Material) -> None:
         """End k holds its tangent and its twist no longer; cable: as that leaves it."""
@@ -372,7 +345,8 @@ class DomainManager:
         cells = cell_ratios(self.user, nodes)
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)
-        self.highest_ratio = max(self.highest_ratio, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))
+        clock = self.zones.clock
+        clock.highest_ratio = max(clock.highest_ratio, np.max(self.ratios[GIVEN], where=~quiet, initial=0.0))
 
     @property
     def cells_to_reject(self) -> np.ndarray:
@@ -391,7 +365,7 @@ class DomainManager:
 
     def review_due(self, t: float) -> bool:
         """Whether a review is due: a catenary asks, a rod has been blended out, or some time has passed."""
-        return self.highest_ratio > 1.0 or t >= self.next_review
+        return bool(self.zones.clock.highest_ratio > 1.0 or t >= self.zones.clock.next_review)
 
     def same_zones(self) -> Change:
         """A change of cells alone."""
@@ -429,7 +403,7 @@ class DomainManager:
     def initial_rods(self, state: State) -> np.ndarray:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
         self.ratios[GIVEN, self.given > 0] = FORCED_RATIO
-        if self.twisted or self.zones.counts.loaded:  # torque needs rods from end to end
+        if self.zones.counts.holds_twist or self.zones.counts.loaded:  # torque needs rods from end to end
             self.ratios[TORSION] = self.ratios[TORSION].max()
         np.maximum(self.ratios[BEND], self.foreseen, out=self.ratios[BEND])
         np.maximum(self.first, self.ratios, out=self.first)
@@ -464,9 +438,9 @@ class DomainManager:
 
     def _losing_tension(self, state: State) -> np.ndarray:
         """Base cells (n,) without weight, hence without a floor, that lose most of their tension within a ramp time."""
-        if not (self.weightless and self.age > 0.0 and self.past.size):
+        if not (self.weightless and self.zones.clock.age > 0.0 and self.past.size):
             return np.zeros(self.layout.rod.size, bool)
-        T = state.T + self.ramp_time / self.age * (state.T - self.past)
+        T = state.T + self.ramp_time / self.zones.clock.age * (state.T - self.past)
         falls = (T < LOST_TENSION * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
         # not by `layout`, which cells that follow leave behind between two reviews
         return np.asarray(np.bincount(self.zones.kinds.base_of_cell, falls, self.layout.rod.size) > 0.0)
@@ -530,7 +504,7 @@ class DomainManager:
 
     @property
     def ramping(self) -> bool:
-        return self.going or self.coming
+        return bool(self.zones.counts.going or self.zones.counts.coming)
 
     def stiffness_shares(self) -> Floats:
         """Part of its bending stiffness that each node has now (N+1,); overwritten by the next call.
@@ -543,4 +517,4 @@ class DomainManager:
         return zones.share
 
     def _update_ramping(self) -> None:
-        self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
+        self.zones.counts.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())

@@ -199,7 +199,7 @@ def test_a_rod_that_comes_back_is_blended_in_again():
     assert manager.leaving.all() and 0.0 < manager.grown.max() < 0.9 and manager.stiffness_shares().max() < 0.9
     pass_by(2.0, 0.9)
     assert not manager.leaving.any() and (manager.grown == 1.0).all() and (manager.stiffness_shares() == 1.0).all()
-    assert not manager.going
+    assert not manager.zones.counts.going
 
 
 def test_far_beyond_is_no_tension_that_is_only_foreseen():

@@ -19,13 +19,14 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.zone_step import blank_zone_job, read_arcs
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import one_line
-from hybrid.simulation import zones_at_rest
+from hybrid.simulation import cell_changes, zones_at_rest
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.criteria import shares_asked
 from hybrid.zones.manager import Allowed, Change, DomainManager, Times
+from tests.inside import never_due
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -46,7 +47,7 @@ def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
     ]
     manager, other = managers
     manager.use_cells_of(before, other.zones)  # as a change of cells leaves it
-    manager.zones.counts.known, manager.zones.past[:], manager.age = 1, 100.0, 1.0
+    manager.zones.counts.known, manager.zones.past[:], manager.zones.clock.age = 1, 100.0, 1.0
     state = state_on(on(what, now), hanging(0.5, 3.0)[0], lambda s: np.where(abs(s - 4.4) < 0.6, 1.0, 90.0))
     assert manager._losing_tension(state).tolist() == [x == 3 for x in range(8)]
 
@@ -266,7 +267,7 @@ def test_a_run_seldom_returns_from_compiled_code(short: hybrid.Result, monkeypat
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT)
     hybrid.run(scene)
     once = len(calls)
-    monkeypatch.setattr(CellChanges, "alone", False)
+    monkeypatch.setattr(cell_changes, "cells_due", never_due)
     found = hybrid.run(scene)
     assert 2 * once < len(calls) - once, (once, len(calls))
     for name in ("position", "tension", "work/zones", "envelope/curvature_max"):
@@ -364,7 +365,7 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
         return booked
 
     monkeypatch.setattr(CellChanges, "change", measured)
-    monkeypatch.setattr(CellChanges, "alone", False)
+    monkeypatch.setattr(cell_changes, "cells_due", never_due)
     hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN, "time.duration=40"]))
     assert len(left) > 50 and 0.0 < np.median(left) < 1e-4 and max(left) < 1e-3, max(left)
 

@@ -104,7 +104,7 @@ def test_a_rod_that_is_blended_in_gets_all_of_its_stiffness_after_a_failed_step(
 def test_torque_asks_for_rods_from_end_to_end(why: str, first: bool) -> None:
     """A torsion ratio of 3 in one cell is one of all, where both ends hold the twist or a moment is given."""
     found = manager("CCCCCCCCCC", [0, 0, 0, 0, 0, 0, 0, 0, 0, 1])
-    found.twisted = why == "twisted"
+    found.zones.counts.holds_twist = why == "twisted"
     if why == "loaded":
         found.load(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
     found.ratios[TORSION, 2] = 3.0
@@ -159,7 +159,7 @@ def test_the_user_speaks_for_catenaries_that_may_be_rods() -> None:
         )
         line = on(found.cable, found.layout)
         found.ask_user(line, state_on(line, along(), tension=1e6), 0.0)
-        assert found.highest_ratio == highest_ratio
+        assert found.zones.clock.highest_ratio == highest_ratio
 
 
 def test_a_joint_is_passed_where_a_rod_grows_and_not_where_one_appears() -> None:
@@ -202,7 +202,7 @@ def test_rods_go_when_they_have_no_stiffness_left_and_the_next_review_is_when_on
     found = manager("RRRRCCCCCC", ramp=1.0)
     found.below_since[:] = -100.0
     found.leaving[:4], found.grown[:4] = True, 0.1
-    assert review_of(found) is None and found.next_review == pytest.approx(0.1)
+    assert review_of(found) is None and found.zones.clock.next_review == pytest.approx(0.1)
     found.grown[:4], found.below_since[:] = 0.0, -100.0
     change = review_of(found)
     assert change is not None and not change.rod.any()
@@ -212,7 +212,7 @@ def test_without_anything_to_do_there_are_four_reviews_in_a_ramp_time() -> None:
     """A little earlier, lest round-off puts one off by a step."""
     found = manager("C" * 10)
     assert review_of(found) is None
-    assert 0.25 * HOLD * (1.0 - 1e-6) < found.next_review < 0.25 * HOLD
+    assert 0.25 * HOLD * (1.0 - 1e-6) < found.zones.clock.next_review < 0.25 * HOLD
 
 
 @pytest.mark.parametrize("wait", [1.0, 8.0])
@@ -220,11 +220,11 @@ def test_without_anything_to_do_there_are_four_reviews_in_a_ramp_time() -> None:
 def test_rods_go_that_were_calm_for_long_enough_and_with_a_torque_none_is(twisted: bool, wait: float) -> None:
     """Rods at both ends and in the middle, of which some are loud; all were calm for 5 s, and are to be for 2 or 16."""
     found = manager("RRCCRRCCRR")
-    found.below_since[:], found.wait_factor[:], found.twisted = -5.0, wait, twisted
+    found.below_since[:], found.wait_factor[:], found.zones.counts.holds_twist = -5.0, wait, twisted
     found.ratios[BEND, 1] = found.ratios[TORSION, 4] = 0.95
     assert review_of(found) is None and not found.ratios.any() and found.seen[BEND, 1] == 0.95
     assert np.isinf(found.below_since[8:]).all() == twisted
-    assert found.leaving[8:].all() == found.going == (not twisted and wait == 1.0)
+    assert found.leaving[8:].all() == found.zones.counts.going == (not twisted and wait == 1.0)
     assert not found.leaving[:2].any()
 
 
@@ -246,7 +246,7 @@ def test_rods_are_urgent_where_a_line_without_weight_loses_tension(
     floor = float(manager("C" * 10).floor.max())  # N, of 10 N/m: without weight where it is below 1e-3 of the scale
     scale = 1e3 * floor * (1.01 if weightless else 0.99)
     found = DomainManager.on_layout(cable(), even(10, "C" * 10), np.zeros(10, int), scale, Allowed(0.01), Times(HOLD))
-    found.zones.past[:], found.zones.counts.known, found.age = before, 1, HOLD
+    found.zones.past[:], found.zones.counts.known, found.zones.clock.age = before, 1, HOLD
     found.ratios[BEND, 7] = 1.5
     change = review_of(found, tension=50.0)
     assert change is not None and change.urgent[7] == urgent

@@ -128,10 +128,10 @@ def test_rods_are_made_for_two_ramp_times_ahead_of_a_winch() -> None:
 def sought(monkeypatch: pytest.MonkeyPatch, apart: float) -> tuple[list[float], DomainManager, Any]:
     """Tolerances (m) at which zones are sought that are so far (m) from the rods, and what comes of it."""
     built, found = managed()
-    found.tolerance, asked = 1.0, []
+    found.zones.clock.tolerance, asked = 1.0, []
 
     def within(*_: Any) -> Any:
-        asked.append(found.tolerance)
+        asked.append(found.zones.clock.tolerance)
         return "zones", "rest"
 
     monkeypatch.setattr(zones_at_rest, "_within", within)
@@ -145,7 +145,7 @@ def test_zones_that_are_far_from_the_rods_are_sought_with_stricter_criteria(monk
     """At the tolerance, a half and a quarter of it; then zones stay rod."""
     asked, found, answer = sought(monkeypatch, apart=1.01)
     assert asked == [1.0, 0.5, 0.25]
-    assert answer[1] == "rods at rest" and found.held and found.tolerance == 1.0
+    assert answer[1] == "rods at rest" and found.held and found.zones.clock.tolerance == 1.0
 
 
 def test_zones_that_are_near_the_rods_are_taken_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -180,7 +180,7 @@ def rescued(outcome: Outcome, rescues: int, slack: int = -1) -> list[int]:
     model = on_layout(built, built.layout._replace(rod=np.zeros(built.layout.rod.size, bool)))
     assert model.layout is not None
     found.set_layout(model.layout)
-    found.ratios[BEND, 10], found.highest_ratio, tried = 5.0, 5.0, state_for(model.line)
+    found.ratios[BEND, 10], found.zones.clock.highest_ratio, tried = 5.0, 5.0, state_for(model.line)
     tried.T[:] = model.slack_floor + 1.0
     if slack >= 0:
         tried.T[slack] = model.slack_floor

@@ -107,7 +107,7 @@ def cells_due(table):
     """Whether nothing but the cells is to change, and they may without Python, as a number."""
     job = read_planner(table)
     zones = job.zone_clock
-    if job.at.alone == 0 or job.zone_counts.cells_due == 0:
+    if job.zone_counts.cells_due == 0:
         return 0
     return 0 if zones.highest_ratio > 1.0 or job.clock.now >= zones.next_review else 1
 

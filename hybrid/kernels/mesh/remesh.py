@@ -77,7 +77,6 @@ class RemeshPlaces(NamedNumbers, number=np.int64):
     changes: int  # so far
     begun: int  # parts of a change up to which nobody but its line has heard of it
     task: int  # where the table of the run has its task
-    alone: int  # 1 where cells may change without Python
     may_wait: int  # 1 where outputs may wait although the cells that they are of change
     waiting: int  # lines whose outputs wait; numbers that are kept for them; numbers of their samples
     placed: int
