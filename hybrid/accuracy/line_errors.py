@@ -27,16 +27,7 @@ from hybrid.accuracy.error_statistics import (
     snaps,
     statistics_of,
 )
-from hybrid.accuracy.refinement import (
-    MOST_OF_MODEL,
-    RAW,
-    Free,
-    Judged,
-    Verdict,
-    missed,
-    not_converged,
-    refined,
-)
+from hybrid.accuracy.refinement import MOST_OF_MODEL, RAW, Free, Judged, Verdict, missed, not_converged, refined
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.plan import NAMED, WORDS, ModelChoice, output_times
 from hybrid.model.resolution import (
@@ -48,14 +39,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.run_sample import (
-    ALL,
-    END_FORCES,
-    RunSample,
-    compared_places,
-    restored_notes,
-    restored_sample,
-)
+from hybrid.simulation.run_sample import ALL, END_FORCES, RunSample, compared_places, restored_notes, restored_sample
 from hybrid.store.integrity import Tree, matched
 from hybrid.store.stored_rows import MissingRows
 

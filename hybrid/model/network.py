@@ -32,15 +32,7 @@ from hybrid.model.bodies import (
 )
 from hybrid.model.build import WHAT, Model, build
 from hybrid.model.catenary_guess import pulls
-from hybrid.model.contents import (
-    IDLE,
-    MEETS,
-    Entry,
-    Touching,
-    obstacle_entries,
-    that_may_meet,
-    touching_among,
-)
+from hybrid.model.contents import IDLE, MEETS, Entry, Touching, obstacle_entries, that_may_meet, touching_among
 from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.initial_shape import dead_loads, first_state, hung
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles

@@ -36,15 +36,7 @@ from hybrid.scene.analysis import (
     without_friction,
 )
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import (
-    Finding,
-    NonNegative,
-    Table,
-    Whole,
-    refuse,
-    turned,
-    value_or_table,
-)
+from hybrid.scene.base import Finding, NonNegative, Table, Whole, refuse, turned, value_or_table
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Section
 from hybrid.scene.ends import AtPoint, Clamped, End, Ends, Guided, Pinned, Triple

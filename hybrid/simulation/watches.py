@@ -17,19 +17,7 @@ from hybrid.kernels.laws.bending_law import EACH, STIFFENING
 from hybrid.kernels.laws.obstacles import distances
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.report import (
-    AXIS,
-    GROOVE,
-    INERTIA,
-    KIND,
-    PLACE,
-    RATE,
-    RIM,
-    RING,
-    SHEAVE,
-    SOIL,
-    STRAND,
-)
+from hybrid.kernels.state.report import AXIS, GROOVE, INERTIA, KIND, PLACE, RATE, RIM, RING, SHEAVE, SOIL, STRAND
 from hybrid.kernels.state.state import Batch, Floats, Sea, ends_in, state_in
 from hybrid.model.build import Model
 from hybrid.outputs.joined_lines import Output

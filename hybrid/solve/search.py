@@ -32,13 +32,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
-from hybrid.solve.flaws import (
-    at_rest,
-    fold_text,
-    lowest_tension,
-    on_obstacles,
-    slack_text,
-)
+from hybrid.solve.flaws import at_rest, fold_text, lowest_tension, on_obstacles, slack_text
 from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import (
