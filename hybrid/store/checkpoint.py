@@ -22,6 +22,7 @@ from hybrid.errors import ResultError
 from hybrid.store.format import Field, check_column, plain_text
 from hybrid.store.hdf5_file import GROUP, of_all
 from hybrid.store.integrity import DIGEST, Tree, matched, pack, stored, unpack
+from hybrid.store.recorder import write_rows
 
 # What was found before the run (the error controller's runs), beside the two slots.
 SLOTS, BEFORE = ("checkpoint/slot_0", "checkpoint/slot_1"), "checkpoint/before"
@@ -91,10 +92,10 @@ def _unreadable(file: h5py.File, detail: str) -> ResultError:
 
 def write_slot(slots: Sequence[h5py.Dataset], number: int, data: bytes) -> None:
     """Write a packed checkpoint over the older of the two; whoever holds the slots open hears of it when that fails."""
-    slot = slots[number % 2]
+    slot = slots[number % 2].id
     if slot.shape[0] < len(data):
-        slot.resize(len(data), axis=0)
-    slot[: len(data)] = np.frombuffer(data, "u1")
+        slot.set_extent((len(data),))
+    write_rows(slot, 0, np.frombuffer(data, "u1"))
 
 
 def read_checkpoint(file: h5py.File) -> Checkpoint:

@@ -123,7 +123,7 @@ def write_texts(file: h5py.File, texts: Mapping[str, str]) -> None:
         if name in file:
             del file[name]
         if text:
-            file.create_dataset(name, data=text, dtype=h5py.string_dtype())
+            h5d.create(file.id, name.encode(), KIND_OF_TEXT, SCALAR).write(h5s.ALL, h5s.ALL, np.array(text, TEXT))
 
 
 def scales_of(points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> dict[str, Field]:
@@ -196,7 +196,7 @@ def attach_scales(data: h5d.DatasetID, dims: Sequence[str], scales: Sequence[h5d
 
 
 TEXT = h5py.string_dtype()
-_KIND_OF_TEXT, SCALAR = h5t.py_create(TEXT, logical=True), h5s.create(h5s.SCALAR)
+KIND_OF_TEXT, SCALAR = h5t.py_create(TEXT, logical=True), h5s.create(h5s.SCALAR)
 
 
 def annotate(data: h5py.Dataset | h5d.DatasetID, unit: str, description: str, frame: str = "") -> None:
@@ -204,7 +204,7 @@ def annotate(data: h5py.Dataset | h5d.DatasetID, unit: str, description: str, fr
     texts = {"units": unit, "description": description, "long_name": description} | ({"frame": frame} if frame else {})
     to = data if isinstance(data, h5d.DatasetID) else data.id
     for name, text in texts.items():
-        h5a.create(to, name.encode(), _KIND_OF_TEXT, SCALAR).write(np.array(text, dtype=TEXT))
+        h5a.create(to, name.encode(), KIND_OF_TEXT, SCALAR).write(np.array(text, dtype=TEXT))
 
 
 def check_column(file: h5py.Group, group: str, field: Field) -> None:

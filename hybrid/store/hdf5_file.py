@@ -173,7 +173,7 @@ def redrafted(path: Path) -> AbstractContextManager[h5py.File]:
     return drafted(path, "r+")
 
 
-def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False) -> h5py.File:
+def created(path: Path, make: bytes | bytearray | Callable[[Path], None], many: bool = False) -> h5py.File:
     """Make a file of these bytes, or by `make`, beside its place, open it to readers, and move it into place.
 
     many: it has so many datasets that nothing of them is to wait in memory until a chunk is full.
@@ -181,7 +181,7 @@ def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False
     So an older result survives a failed start, and a reader who has it open keeps what he sees.
     """
     with replacing(path) as new:
-        if isinstance(make, bytes):
+        if isinstance(make, bytes | bytearray):
             new.write_bytes(make)
         else:
             make(new)

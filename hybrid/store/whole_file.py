@@ -1,7 +1,8 @@
 """The file of a result, made in one go of what is in memory: of a short run when it has ended, of others as they begin.
 
-HDF5 takes 20 ms to make the 100 datasets of a line with their units and dimensions, and 3 ms to open them.  So a file
-of few lines begins as a template: the bytes of one with all datasets and no values, which the process keeps.
+HDF5 takes 20 ms to make the 100 datasets of a line with their units and dimensions, 3 ms to open them, and 2 to write.
+So a file of few lines begins as a template: the bytes of one with all datasets and no values, which the process keeps.
+Where all is complete, HDF5 has said where in it the values belong, and they are put there without it.
 
 A file that readers may open while it grows is flushed before and after every change of its lengths, and what is known
 of a result afterwards goes into a copy.  A run that takes less than the time for which outputs are held back anyhow
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from time import monotonic
@@ -26,9 +27,12 @@ from h5py import h5a, h5d, h5ds, h5o, h5p, h5s, h5t
 from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
 from hybrid.store.format import (
     BLOCK,
+    KIND_OF_TEXT,
     SCALAR,
     STATUS_WIDTHS,
+    TEXT,
     ArrayContents,
+    ArrayDataset,
     annotate,
     attach_scales,
     chunk_rows,
@@ -45,8 +49,10 @@ WAITS = 0.2  # s, that it waits at most while errors of the result are estimated
 MOST_STAYING = 256_000_000
 _staying: WeakSet[ArrayContents] = WeakSet()
 # Lines in a file that begins as a template, and templates that are kept, of 80 kB a line.
-MOST_LINES, MOST_KEPT = 8, 64
-_kept: dict[Hashable, bytes] = {}
+MOST_LINES, MOST_KEPT = 8, 32
+# Bytes of values for which a template has room, which stay with it.
+MOST_PLACED = 1_000_000
+_kept: dict[Hashable, Template] = {}
 
 
 class Restart(NamedTuple):
@@ -63,7 +69,7 @@ class LateFile:
     """A result in memory, to be added to until it is written to its place."""
 
     def __init__(self, path: Path, contents: ArrayContents, restart: Restart | None, outputs: int | None) -> None:
-        """path: its place; the others: as of `new_file`."""
+        """path: its place; the others: as of `image_of_result`."""
         self.path, self.contents, self.placed = path, contents, False
         self._restart, self._outputs = restart, outputs
         self._made = monotonic()  # s
@@ -92,7 +98,7 @@ class LateFile:
             return
         self.placed = True
         with replacing(self.path, by_hdf5=True) as new:
-            image = image_of(new_file(self.contents, self._restart, self._outputs))
+            image = image_of_result(self.contents, self._restart, self._outputs, True)
             with new.open("wb") as file:
                 file.write(image)
                 file.write(tail_of(len(image), zlib.crc32(image)))
@@ -124,48 +130,90 @@ def groups_of(contents: ArrayContents) -> Iterator[tuple[str, ArrayContents]]:
         yield f"{GROUP}/{name}/", part
 
 
-def new_file(contents: ArrayContents, restart: Restart | None, outputs: int | None) -> h5py.File:
-    """A file in memory of a result, with the rows that it has.
+def image_of_result(contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool) -> bytearray:
+    """The bytes of the file of a result, with the rows that it has.
 
-    restart: None: nobody can go on with it; outputs: their number if it is known, which only makes small files smaller.
+    restart: None: nobody can go on with it; outputs: their number if it is known, which only makes small files smaller;
+    complete: whether no rows will be added before it is copied.
     """
-    few, groups = len(contents.parts) < MOST_LINES, [*groups_of(contents)]
-    shape = (*((group, _shape_of(part)) for group, part in groups), outputs, restart is not None) if few else None
-    file, bare = in_memory(_kept.get(shape, b"")), Bare(outputs)
-    if shape not in _kept:
-        if restart is not None:
-            create_slots(file)
-        if few:
-            for group, part in groups:
-                bare.create(file, group, part)
-            _keep(shape, file)
-    for k, (group, part) in enumerate(groups, 1):
-        _fill(file, group, part, {} if few else bare.create(file, group, part))
+    groups = dict(groups_of(contents))
+    few = len(groups) <= MOST_LINES
+    complete &= few and contents.size <= MOST_PLACED
+    of_groups = ((group, _shape_of(part, complete)) for group, part in groups.items())
+    shape = (*of_groups, outputs, restart is not None, complete)
+    if few and shape not in _kept:
+        if len(_kept) >= MOST_KEPT:
+            _kept.clear()
+        _kept[shape] = _template(groups, restart is not None, outputs, complete)
+    template, bare = _kept[shape] if few else Template(b"", {}), Bare(outputs, False)
+    file = in_memory(template.content)
+    for k, (group, part) in enumerate(groups.items(), 1):
+        _fill(file, group, part, {} if few else bare.create(file, group, part), template.places)
         if k % TOGETHER == 0:
             file.flush()
     bare.close()
     if contents.parts:
         file[GROUP].attrs["order"] = list(contents.parts)
     if restart is not None:
+        if not few:
+            create_slots(file)
         slots = [file[name] for name in SLOTS] if restart.checkpoints else []
         for number, data in restart.checkpoints.items():
             write_slot(slots, number, data)
         write_before(file, restart.before)
-    return file
+    image = bytearray(image_of(file))
+    for (group, name), places in template.places.items():
+        values = groups[group].data[name].values
+        for at, rows in places:
+            data = np.ascontiguousarray(values[rows]).tobytes()
+            image[at : at + len(data)] = data
+    return image
 
 
-def _shape_of(part: ArrayContents) -> Hashable:
+class Template(NamedTuple):
+    """A file without values.
+
+    places: where HDF5 has room for those of datasets (group of the line, name): begin, and rows that stand there.
+    """
+
+    content: bytes
+    places: Mapping[tuple[str, str], Sequence[tuple[int, Any]]]
+
+
+def _template(groups: Mapping[str, ArrayContents], resumable: bool, outputs: int | None, complete: bool) -> Template:
+    file, bare, places = in_memory(), Bare(outputs, complete), dict[tuple[str, str], Sequence[tuple[int, Any]]]()
+    for group, part in groups.items():
+        made = bare.create(file, group, part)
+        places |= {(group, x): _places(made[x], y) for x, y in part.data.items() if _has_place(y, complete)}
+    bare.close()
+    made.clear()
+    if resumable:
+        create_slots(file)
+    return Template(image_of(file), places)
+
+
+def _has_place(x: ArrayDataset, complete: bool) -> bool:
+    """Whether a template has room for the values of a dataset: rows of tables beside the outputs are of any number."""
+    return complete and bool(x.values.size) and (not x.grows or x.dims[0] == "t")
+
+
+def _places(data: h5d.DatasetID, x: ArrayDataset) -> list[tuple[int, Any]]:
+    if not x.grows:
+        return [(data.get_offset(), ...)]
+    chunks = [data.get_chunk_info(k) for k in range(data.get_num_chunks())]
+    rows = data.get_create_plist().get_chunk()[0]
+    return [(c.byte_offset, slice(c.chunk_offset[0], c.chunk_offset[0] + rows)) for c in chunks]
+
+
+def _shape_of(part: ArrayContents, complete: bool) -> Hashable:
     """What the datasets of a result depend on."""
-    of_rows = ((x.field, x.dims, x.values.shape[x.grows :], x.grows) for x in part.data.values())
+    of_rows = ((x.field, x.dims, _shape(x, complete), x.grows) for x in part.data.values())
     return tuple(of_rows), tuple(part.groups)
 
 
-def _keep(shape: Hashable, file: h5py.File) -> None:
-    """Keep the bytes of a file that has no values yet."""
-    if len(_kept) >= MOST_KEPT:
-        _kept.clear()
-    file.flush()
-    _kept[shape] = bytes(file.id.get_file_image())
+def _shape(x: ArrayDataset, complete: bool) -> tuple[int, ...]:
+    """Of a new dataset; rows that are written one after the other come later."""
+    return x.values.shape if not x.grows or _has_place(x, complete) else (0, *x.values.shape[1:])
 
 
 class Bare:
@@ -174,14 +222,14 @@ class Bare:
     A copy has no dimension scales, which HDF5 would not translate; they are attached where they stand.
     """
 
-    def __init__(self, outputs: int | None) -> None:
-        """outputs: as of `new_file`."""
-        self._outputs, self._made = outputs, dict[Hashable, h5py.File]()
+    def __init__(self, outputs: int | None, complete: bool) -> None:
+        """outputs, complete: as of `image_of_result`."""
+        self._outputs, self._complete, self._made = outputs, complete, dict[Hashable, h5py.File]()
 
     def create(self, file: h5py.File, group: str, part: ArrayContents) -> dict[str, h5d.DatasetID]:
-        """The datasets of a result in a file, by name; columns that grow are empty."""
+        """The datasets of a result in a file, by name; columns that grow are empty, unless all is complete."""
         if group:
-            shape = _shape_of(part)
+            shape = _shape_of(part, self._complete)
             if shape not in self._made:
                 self._made[shape] = in_memory()
                 self._datasets(self._made[shape], part)
@@ -206,18 +254,22 @@ class Bare:
             root.require_group(name)
         found = dict[str, h5d.DatasetID]()
         for name, x in part.data.items():
-            shape, dtype, chunk, most = x.values.shape, x.values.dtype, (), None
+            shape, dtype = _shape(x, self._complete), x.values.dtype
+            chunk: tuple[int, ...] = ()
+            most: tuple[int, ...] | None = None
             if x.grows:
                 if dtype.kind == "S":
                     dtype = h5py.string_dtype("utf-8", dtype.itemsize)
-                shape = (0, *shape[1:])
                 size = int(dtype.itemsize * np.prod(shape[1:], dtype=int))
                 few = self._outputs if x.dims[0] in ("t", "zones/t") else None
                 chunk = (max(1, min(chunk_rows(size), BLOCK, few or BLOCK)), *shape[1:])
                 most = (h5s.UNLIMITED, *shape[1:])
             kind = NUMBERS.get(x.field.dtype) or h5t.py_create(dtype, logical=True)
-            space = h5s.create_simple(shape, most) if shape else SCALAR
-            found[name] = data = h5d.create(root.id, name.encode(), kind, space, _creation(chunk), _links())
+            space, how = (
+                h5s.create_simple(shape, most) if shape else SCALAR,
+                _creation(chunk, _has_place(x, self._complete)),
+            )
+            found[name] = data = h5d.create(root.id, name.encode(), kind, space, how, _links())
             annotate(data, x.field.unit, x.field.description, x.field.frame)
             if x.dims == (name,):
                 h5ds.set_scale(data, (name.rpartition("/")[2] if x.grows else name).encode())
@@ -226,11 +278,14 @@ class Bare:
 
 
 @cache
-def _creation(chunk: tuple[int, ...]) -> h5p.PropDCID:
-    """How a dataset is made of such chunks, or of none."""
+def _creation(chunk: tuple[int, ...], has_place: bool) -> h5p.PropDCID:
+    """How a dataset is made of such chunks, or of none; has_place: with room for its values, which come later."""
     creation = h5p.create(h5p.DATASET_CREATE)
     if chunk:
         creation.set_chunk(chunk)
+    if has_place:
+        creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+        creation.set_fill_time(h5d.FILL_TIME_NEVER)
     return creation
 
 
@@ -242,13 +297,16 @@ def _links() -> h5p.PropLCID:
     return links
 
 
-def _fill(file: h5py.File, group: str, part: ArrayContents, known: Mapping[str, h5d.DatasetID]) -> None:
-    """Attributes, texts and values of a result; known: datasets that are open."""
+def _fill(
+    file: h5py.File, group: str, part: ArrayContents, known: Mapping[str, h5d.DatasetID],
+    without: Collection[tuple[str, str]],
+) -> None:  # fmt: skip
+    """Attributes, texts and values of a result; known: datasets that are open; without: those that are left out."""
     root = file[group] if group else file
     write_attributes(root, part.attributes)
     write_texts(root, {name: made(text) for name, text in part.texts.items()})
     for name, x in part.data.items():
-        if not x.values.size:
+        if not x.values.size or (group, name) in without:
             continue
         data = known[name] if known else h5d.open(root.id, name.encode())
         if x.grows:
@@ -258,10 +316,11 @@ def _fill(file: h5py.File, group: str, part: ArrayContents, known: Mapping[str, 
 
 def write_attributes(root: h5py.Group, attributes: Mapping[str, Any]) -> None:
     """Attributes of a result, by HDF5's own interface: h5py takes five times as long."""
-    text = h5py.string_dtype()
     for name, value in attributes.items():
-        if name in STATUS_WIDTHS:
-            array = fixed_text(value, h5py.string_dtype("utf-8", STATUS_WIDTHS[name]))
+        if isinstance(value, str) and name not in STATUS_WIDTHS:
+            array, kind = np.array(value, TEXT), KIND_OF_TEXT
         else:
-            array = np.array(value, text if isinstance(value, str) else None)
-        h5a.create(root.id, name.encode(), h5t.py_create(array.dtype, logical=True), SCALAR).write(array)
+            width = STATUS_WIDTHS.get(name)
+            array = np.array(value) if width is None else fixed_text(value, h5py.string_dtype("utf-8", width))
+            kind = h5t.py_create(array.dtype, logical=True)
+        h5a.create(root.id, name.encode(), kind, SCALAR).write(array)

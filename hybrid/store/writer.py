@@ -59,7 +59,6 @@ from hybrid.store.hdf5_file import (
     give_up,
     group_of,
     hold_metadata,
-    image_of,
     in_memory,
     in_turn,
     names_in,
@@ -73,7 +72,7 @@ from hybrid.store.hdf5_file import (
 from hybrid.store.integrity import Tree, copy_unsigned, pack, sign, sign_new
 from hybrid.store.recorder import NUMBERS, Rows, Table, pause, write_rows
 from hybrid.store.records import FINER_RESULT, PENDING
-from hybrid.store.whole_file import LateFile, Restart, new_file
+from hybrid.store.whole_file import LateFile, Restart, image_of_result
 
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here
 NOTHING_MORE: Tree = {}  # what a run that is done leaves to go on with
@@ -370,9 +369,9 @@ class Recorder(Rows):
 
     def _appear(self) -> None:
         """Let readers see a file, with all that there is now."""
-        self._continue_in(image_of(new_file(self.contents(), self._restart(), self._outputs_known)))
+        self._continue_in(image_of_result(self.contents(), self._restart(), self._outputs_known, False))
 
-    def _continue_in(self, made: bytes | Callable[[Path], None]) -> None:
+    def _continue_in(self, made: bytearray | Callable[[Path], None]) -> None:
         """Write to a new file from now on; made: as of `created`."""
         assert self.path is not None
         self._broken = True  # until there is a file
@@ -501,7 +500,7 @@ class Recorder(Rows):
         if isinstance(self._memory, MemoryTarget):
             self._memory.contents = contents
         elif self._memory is not None:
-            self._memory.write(image_of(new_file(contents, None, self._outputs_known)))
+            self._memory.write(image_of_result(contents, None, self._outputs_known, True))
         else:
             assert self.path is not None
             self.late_file = LateFile(self.path, contents, self._restart(), self._outputs_known)

@@ -154,11 +154,13 @@ HEIGHTS = Field("z", "m", "heights of the current", (2,), ("z",))
 
 
 def write(path: Path, fields: tuple[Field, ...] = FIELDS, length: float = 2.0) -> None:
-    """A result of one output."""
+    """A result of three outputs, complete when its file is made."""
     s = np.linspace(0.0, length, 5)
     fixed = [(HEIGHTS, np.array([0.0, -length]))]
-    with Recorder(path, Header(s, fields, (), {"title": "made up"}, {"scene": "a: 1"}, fixed)) as recorder:
-        recorder.save(0.0, {f.name: np.ones(f.shape) for f in fields}, [("rod", 0.0, length)])
+    header = Header(s, fields, (), {"title": "made up"}, {"scene": "a: 1"}, fixed)
+    with Recorder(path, header, mode=WriteMode(late=True)) as recorder:
+        for t in (0.0, 1.0, 2.0):
+            recorder.save(t, {f.name: t + np.ones(f.shape) for f in fields}, [("rod", 0.0, length)])
 
 
 def content(path: Path) -> dict[str, tuple[str, list[object], list[tuple[str, str]]]]:
@@ -179,6 +181,7 @@ def content(path: Path) -> dict[str, tuple[str, list[object], list[tuple[str, st
 
 
 def test_the_second_file_of_the_same_datasets_is_as_the_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And as one whose values HDF5 has written."""
     made: list[str] = []
     create = store.Bare.create
     monkeypatch.setattr(store, "_kept", {})
@@ -191,6 +194,9 @@ def test_the_second_file_of_the_same_datasets_is_as_the_first(tmp_path: Path, mo
     assert len(made) == 1
     write(tmp_path / "other.h5", FIELDS[:1])
     assert len(made) == 2 and "energy/kinetic" not in content(tmp_path / "other.h5")
+    monkeypatch.setattr(store, "MOST_PLACED", 0)
+    write(tmp_path / "written.h5")
+    assert content(tmp_path / "written.h5") == content(tmp_path / "first.h5") and len(made) == 3
 
 
 # How often a run hands over what it has: by what making and writing it take.
