@@ -249,12 +249,19 @@ def twist_uniformly(model: Model, state: State, angle: float) -> Ends:
 # --- statics: lines --------------------------------------------------------------------------------
 
 
-def sagging_line(axial_stiffness: float | None, cells: int) -> Scene:
-    """A heavy cable of 100 m between two points 70 m apart and 20 m different in height: the (elastic) catenary.
+def elastic_catenary(s: Any, H: float, V: float, w: float, c: float) -> tuple[Any, Any]:
+    """x and z (m) at s of an elastic catenary, H and V being the forces at its start; c = 1/EA.
 
-    With V and H the vertical and horizontal force at the start and p = w s - V,
-    x = H s/EA + (H/w) (asinh(p/H) + asinh(V/H)),  z = (w s^2/2 - V s)/EA + (sqrt(H^2 + p^2) - sqrt(H^2 + V^2))/w
-    (Irvine, Cable Structures, 1981, section 2.4): `sagging_line_exact`.
+    With p = w s - V: x = H s/EA + (H/w) (asinh(p/H) + asinh(V/H)),
+    z = (w s^2/2 - V s)/EA + (sqrt(H^2 + p^2) - sqrt(H^2 + V^2))/w  (Irvine, Cable Structures, 1981, section 2.4).
+    """
+    p = w * s - V
+    x = H * s * c + H / w * (np.arcsinh(p / H) + np.arcsinh(V / H))
+    return x, (0.5 * w * s * s - V * s) * c + (p - V) * (p + V) / (np.hypot(H, p) + np.hypot(H, V)) / w
+
+
+def sagging_line(axial_stiffness: float | None, cells: int) -> Scene:
+    """A heavy cable of 100 m between two points 70 m apart and 20 m different in height: `sagging_line_exact`.
 
     Discretisation: order 2 in shape and tension.  The polygon hangs its load at the nodes,
     so it is off by the sag of a cell, h^2 w/(8 H), on every cell: 1e-2 m at 40 cells; and the tension in the middle
@@ -269,15 +276,9 @@ def sagging_line_exact(axial_stiffness: float | None, s: Floats) -> tuple[Floats
     """Position (ns, 3) and tension (ns,) of `sagging_line` at s, and (H, V)."""
     L, w = 100.0, 10.0
     c = 1.0 / axial_stiffness if axial_stiffness else 0.0
-
-    def shape(H: float, V: float, s: Any) -> tuple[Any, Any]:
-        p = w * s - V
-        x = H * s * c + H / w * (np.arcsinh(p / H) + np.arcsinh(V / H))
-        return x, (0.5 * w * s * s - V * s) * c + (np.hypot(H, p) - np.hypot(H, V)) / w
-
-    found = root(lambda q: np.array(shape(q[0], q[1], L)) - [70.0, 20.0], (200.0, 400.0), tol=1e-13)
+    found = root(lambda q: np.array(elastic_catenary(L, *q, w, c)) - [70.0, 20.0], (200.0, 400.0), tol=1e-13)
     H, V = (float(q) for q in found.x)
-    x, z = shape(H, V, s)
+    x, z = elastic_catenary(s, H, V, w, c)
     return np.column_stack([x, np.zeros_like(s), z]), np.hypot(H, w * s - V), (H, V)
 
 

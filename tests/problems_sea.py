@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from problems import ORIGIN, free, pinned
+from problems import ORIGIN, elastic_catenary, free, pinned
 from scipy.integrate import quad, solve_bvp, solve_ivp
 from scipy.optimize import brentq, root
 
@@ -236,15 +236,10 @@ def loaded_span_exact(load: float, s: Floats) -> tuple[Floats, Floats]:
     """Position (ns, 3) and tension (ns,) of `loaded_span`: two elastic catenaries with one H, V jumping by the load."""
     w, c, L, at = in_water(2.0, 0.03), 1e-6, 100.0, 40.0
 
-    def piece(H: float, V: float, s: Any) -> tuple[Any, Any]:
-        """From where the vertical force (downwards on what lies before) is -V."""
-        p = w * s - V
-        x = H * s * c + H / w * (np.arcsinh(p / H) + np.arcsinh(V / H))
-        return x, (0.5 * w * s * s - V * s) * c + (np.hypot(H, p) - np.hypot(H, V)) / w
-
     def shape(H: float, V: float, s: Floats) -> tuple[Floats, Floats]:
         after = V - w * at - load
-        a, b = piece(H, V, np.minimum(s, at)), piece(H, after, np.maximum(s - at, 0.0))
+        a = elastic_catenary(np.minimum(s, at), H, V, w, c)
+        b = elastic_catenary(np.maximum(s - at, 0.0), H, after, w, c)
         return a[0] + b[0], a[1] + b[1]
 
     found = root(lambda q: np.ravel(shape(q[0], q[1], np.array([L]))) - [80.0, 20.0], (300.0, 300.0), tol=1e-13)
@@ -358,9 +353,8 @@ def body_in_current_exact(s: Floats) -> tuple[Floats, Floats]:
     w, c, H, V = in_water(3.0, 0.03), 1e-6, 0.5 * RHO * 0.6, (80.0 - RHO * 0.03) * G
 
     def up(q: Any) -> Floats:
-        p = V + w * q
-        x = H * q * c + H / w * (np.arcsinh(p / H) - np.arcsinh(V / H))
-        return np.array([x, 0 * x, (V * q + 0.5 * w * q * q) * c + (np.hypot(H, p) - np.hypot(H, V)) / w])
+        x, z = elastic_catenary(q, H, -V, w, c)
+        return np.array([x, 0 * x, z])
 
     return (up(50.0 - s) * [[-1], [1], [1]] + (up(50.0) * [1, 1, -1])[:, None]).T, np.hypot(H, V + w * (50.0 - s))
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from problems import writhe
+from problems_sea import grounded_catenary
 
 import hybrid
 from hybrid.errors import ZONE_EVENTS
@@ -300,20 +301,13 @@ def test_touchdown_is_that_of_a_catenary_at_rest_and_moves_with_the_fairlead() -
     result = ran("touchdown")
     w, depth, length, across = 9.81 * (20 - 1025 * math.pi / 4 * 0.05**2), 100.0, 250.0, 205.0
 
-    def hanging(H: float) -> float:
-        return math.sqrt(depth**2 + 2 * depth * H / w)
-
-    low, high = 1e3, 1e5
-    for _ in range(60):  # bisection for the H with which the line spans the distance
-        H = 0.5 * (low + high)
-        span = length - hanging(H) + H / w * math.asinh(hanging(H) * w / H)
-        low, high = (H, high) if span < across else (low, H)
+    H, hangs, _ = grounded_catenary(depth, length, across, w, None)
     assert round(H) == 14285
     assert result.tension[0, 0] == pytest.approx(H, rel=3e-3)
     assert result.tension[0, -1] == pytest.approx(H + w * depth, rel=3e-3)
     assert ran_as("rod", "touchdown").tension[0, 0] == pytest.approx(H, rel=1e-3)  # more cells; the bed gives way
     rounded = math.sqrt(2 * w / 5e3 * H / w)  # where a parabola of curvature w/H is w/k above the line on the bed
-    assert result.touchdown[0, 1] == pytest.approx(length - hanging(H) + rounded, abs=0.5)
+    assert result.touchdown[0, 1] == pytest.approx(length - hangs + rounded, abs=0.5)
     late = settled(result, 52.0)
     end = result.touchdown[late, 1]
     assert (end.min(), end.max()) == pytest.approx((79.0, 102.4), abs=0.5)

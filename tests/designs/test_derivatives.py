@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from problems_sea import grounded_catenary
 from typer.testing import CliRunner
 
 import hybrid
@@ -325,15 +325,7 @@ def lies(length: float, far: float, stretch: float) -> float:
 
     stretch: w / EA, 1/m; elastic catenary (on the bed the pull is the same all along it).
     """
-
-    def too_far(a: float) -> float:  # pull over weight, m
-        hung = hanging(a)
-        return length - hung + a * math.asinh(hung / a) + stretch * a * length - far
-
-    def hanging(a: float) -> float:
-        return brentq(lambda x: math.hypot(a, x) - a + 0.5 * stretch * x * x - 95.0, 1.0, length, xtol=1e-12)
-
-    return length - hanging(brentq(too_far, 10.0, 500.0, xtol=1e-12))
+    return length - grounded_catenary(95.0, length, far, 1.0, 1.0 / stretch)[1]
 
 
 @pytest.mark.parametrize("cells", [60, 100, 121])

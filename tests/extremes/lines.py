@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from extreme import AXES, MODELS, Case, Floats, Measured, X, Z, clamped, free, pinned, scene, spread
+from problems import elastic_catenary
 from scipy.optimize import brentq, root
 
 G = 9.81
@@ -99,21 +100,12 @@ def catenary_force(L: float, w: float, EA: float | None, span: float, rise: floa
         H, V = T * span / chord, 0.5 * w * L - T * rise / chord
 
     def miss(q: Floats) -> Floats:
-        return np.array(catenary_shape(L, w, EA, float(np.exp(q[0])), float(q[1] * w * L), L)) / L - [
-            span / L,
-            rise / L,
-        ]
+        x, z = elastic_catenary(L, float(np.exp(q[0])), float(q[1] * w * L), w, 1.0 / EA if EA else 0.0)
+        return np.array([x - span, z - rise]) / L
 
     found = root(miss, [np.log(H), V / (w * L)], tol=1e-14)
     assert np.abs(miss(found.x)).max() < 1e-10, "the closed form did not close"
     return float(np.exp(found.x[0])), float(found.x[1] * w * L)
-
-
-def catenary_shape(L: float, w: float, EA: float | None, H: float, V: float, s: Any) -> tuple[Any, Any]:
-    """x and z at s of an elastic catenary."""
-    c, p = (1.0 / EA if EA else 0.0), w * s - V
-    x = H * s * c + H / w * (np.arcsinh(p / H) + np.arcsinh(V / H))
-    return x, (0.5 * w * s * s - V * s) * c + (p - V) * (p + V) / (np.hypot(H, p) + np.hypot(H, V)) / w
 
 
 def sagging() -> Iterator[Case]:
@@ -147,7 +139,7 @@ def sagging() -> Iterator[Case]:
             result: Any, L: float = L, w: float = w, EA: Any = EA, H: float = H, V: float = V, start: Floats = start, h: float = h, EI: float = EI,
             span: float = span, model: str = d["model"],
         ) -> Measured:  # fmt: skip
-            x, z = catenary_shape(L, w, EA, H, V, result.s)
+            x, z = elastic_catenary(result.s, H, V, w, 1.0 / EA if EA else 0.0)
             exact = start + np.column_stack([x, 0 * x, z])
             bent = EI * w / H**2 * (1.0 if model != "catenary" else 0.0) + (1e-3 * L if model == "adaptive" else 0.0)
             allowed = h * h * w / (8 * H) + bent + 1e-7 * L
@@ -230,7 +222,7 @@ def coarse() -> Iterator[Case]:
             H, V = catenary_force(L, w, None, tight * L, 0.1 * L)
 
             def truth(result: Any, L: float = L, w: float = w, H: float = H, V: float = V) -> Measured:
-                x, z = catenary_shape(L, w, None, H, V, result.s)
+                x, z = elastic_catenary(result.s, H, V, w, 0.0)
                 yield "shape/L", np.abs(result.position[-1] - np.column_stack([x, 0 * x, z])).max() / L, 0.02
 
             tables = scene(line, pinned(), pinned((tight * L, 0, 0.1 * L)), "catenary", n, G)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from extreme import AXES, MODELS, Case, Floats, Measured, Z, clamped, free, pinned, scene, spread
 from lines import G, section, told
+from problems import elastic_catenary
 from rods import rod
 from scipy.special import ellipj, ellipk
 
@@ -298,7 +299,7 @@ def twists() -> Iterator[Case]:
 
 def moves() -> Iterator[Case]:
     """A hanging line whose end is moved and comes to rest under damping: the catenary of its new place."""
-    from lines import catenary_force, catenary_shape
+    from lines import catenary_force
 
     source = (
         "elastic catenary of the last place; discretisation: as at rest, 0.7/n² on the pull, the sag of a cell on the shape, "
@@ -329,7 +330,7 @@ def moves() -> Iterator[Case]:
             w: float = w,
             model: str = d["model"],
         ) -> Measured:
-            x, z = catenary_shape(L, w, EA, H, V, result.s)
+            x, z = elastic_catenary(result.s, H, V, w, 1.0 / EA if EA else 0.0)
             h = L / n / (0.8 if model in ("zones", "adaptive") else 1.0)
             bent = (EI * w / H**2 if model != "catenary" else 0.0) + (1e-3 * L if model == "adaptive" else 0.0)
             allowed = h * h * w / (8 * H) + bent + 1e-3 * L

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from problems_sea import grounded_catenary
 
 import hybrid
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -40,14 +40,7 @@ def chain(quantities: dict[str, Any], **changes: Any) -> hybrid.Result:
 
 def closed_form() -> tuple[float, float, float]:
     """Horizontal force N, suspended length m and its horizontal reach m, of an inextensible chain on a rigid bed."""
-
-    def over(h: float) -> float:
-        a = h / W
-        suspended = math.sqrt(DEPTH * (DEPTH + 2.0 * a))
-        return a * math.asinh(suspended / a) + LENGTH - suspended - SPAN
-
-    h = brentq(over, 1e3, 1e6)
-    suspended = math.sqrt(DEPTH * (DEPTH + 2.0 * h / W))
+    h, suspended, _ = grounded_catenary(DEPTH, LENGTH, SPAN, W, None)
     return h, suspended, h / W * math.asinh(suspended / (h / W))
 
 

@@ -6,18 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from problems import momenta
 from random_scenes import random_scene
 
 import hybrid
-from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.state.books import FRICTION
 from hybrid.kernels.step.newton import NEAR
+from hybrid.solve.stepper import NetworkState
 from hybrid.view.summary import facts_of
 from tests.inside import OnlyLine
 from tests.said import kinds, work_put_in
 from tests.scenes import cable_scene, pinned_at
+from tests.validation import thrown_lines
 
-WIDTH, STIFF = 0.02, 0.1
+WIDTH = thrown_lines.WIDTH
 
 
 def hairpin(angle: float, gap: float, chord: float = 0.025) -> np.ndarray:
@@ -39,12 +41,8 @@ def hairpin(angle: float, gap: float, chord: float = 0.025) -> np.ndarray:
 def flying(r: np.ndarray, step: float, duration: float, width: float = WIDTH, **contact: Any) -> hybrid.Simulation:
     """A line with nodes at r, m, that nothing holds."""
     s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
-    section = {
-        "length": float(s[-1]), "mass": 0.4, "diameter": width, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
-        "torsional_stiffness": 0.8 * STIFF,
-    }  # fmt: skip
     return hybrid.Simulation(cable_scene(
-        section, {"kind": "free"}, {"kind": "free"}, gravity=1e-15, contact={"self": True} | contact, model="rod",
+        thrown_lines.section(float(s[-1]), width), {"kind": "free"}, {"kind": "free"}, gravity=1e-15, contact={"self": True} | contact, model="rod",
         mesh={"nodes": s.tolist()}, initial={"kind": "points", "points": r.tolist()}, dimension=3,
         time=(duration, step, 0.9), output=(2.0 * duration, 5)
     ))  # fmt: skip
@@ -52,10 +50,7 @@ def flying(r: np.ndarray, step: float, duration: float, width: float = WIDTH, **
 
 def energy(line: OnlyLine) -> float:
     """Kinetic, elastic and contact energy, J."""
-    x, model, parts = line.state, line.model, np.zeros(4)
-    room = np.zeros((x.T.size + 1, 3))
-    observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
-    return float(parts.sum()) + float(line.contact.contact.numbers.energy)
+    return thrown_lines.energy([line.model], NetworkState([line.state]), line.contact, [None], [])
 
 
 @pytest.mark.long
@@ -78,7 +73,7 @@ def test_a_throw(seed: int, steps: float) -> None:
     line.state.v[:] += 0.05 * speed * random.normal(size=3)
     line.begin_again()
     mass = line.model.line.mass[:, None]
-    momentum, first, most, touched = (mass * line.state.v).sum(axis=0), energy(line), 0.0, False
+    (momentum, _), first, most, touched = momenta(line.model, line.state), energy(line), 0.0, False
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
         most = max(most, energy(line))
@@ -86,8 +81,7 @@ def test_a_throw(seed: int, steps: float) -> None:
     assert touched
     assert most < 1.001 * first
     assert line.line.envelope.itself.itself.found.least_distance > 0.5 * WIDTH
-    moved = (mass * line.state.v).sum(axis=0) - momentum
-    assert np.abs(moved).max() < 1e-13 * mass.sum() * speed
+    assert np.abs(momenta(line.model, line.state)[0] - momentum).max() < 1e-13 * mass.sum() * speed
 
 
 def thrown(seed: int) -> tuple[hybrid.Simulation, OnlyLine, float, float]:
@@ -145,15 +139,6 @@ def test_steps_that_would_create_energy_are_repeated() -> None:
     assert f"{line.contact.given_up} tries" in text and "energy" in text
 
 
-def angular_momentum(inside: OnlyLine) -> np.ndarray:
-    """About the origin, with that of the sections (3,) kg m2/s."""
-    line, x = inside.model.line, inside.state
-    length = np.linalg.norm(x.e, axis=1)[:, None]
-    d, turning = x.e / length, np.diff(x.v, axis=0) / length
-    sections = line.polar[:, None] * x.w[:, None] * d + line.rotary[:, None] * np.cross(d, turning)
-    return np.cross(x.r, line.mass[:, None] * x.v).sum(axis=0) + sections.sum(axis=0)
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.2, 0.6])
 def test_friction_keeps_momentum_and_angular_momentum(friction: float) -> None:
     """In steps that resolve the collision; in longer ones the time scheme loses angular momentum, with friction or without."""
@@ -167,10 +152,10 @@ def test_friction_keeps_momentum_and_angular_momentum(friction: float) -> None:
     line.begin_again()
     mass = line.model.line.mass[:, None]
     size = (np.linalg.norm(line.state.r, axis=1)[:, None] * mass * np.abs(line.state.v)).sum()
-    momentum, turning, first = (mass * line.state.v).sum(axis=0), angular_momentum(line), energy(line)
+    (momentum, turning), first = momenta(line.model, line.state), energy(line)
     simulation.advance(duration)
-    assert np.abs((mass * line.state.v).sum(axis=0) - momentum).max() < 1e-13 * mass.sum() * speed
-    assert np.abs(angular_momentum(line) - turning).max() < 1e-6 * size
+    left, turns = momenta(line.model, line.state)
+    assert np.abs(left - momentum).max() < 1e-13 * mass.sum() * speed and np.abs(turns - turning).max() < 1e-6 * size
     lost = -float(line.books.work[0, FRICTION]) / first
     assert 3e-4 < lost < 0.1 if friction else lost == 0.0
     assert energy(line) < first * (1.0001 - lost)

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 import yaml
 from random_scenes import random_network
+from scipy.spatial.transform import Rotation
 
 import hybrid
+from tests.combinations.pairs import seen_by
 from tests.scenes import network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
@@ -27,16 +29,7 @@ def tables_of(name: str) -> dict[str, Any]:
 
 def turned(tables: dict[str, Any], heading: float) -> dict[str, Any]:
     """The same scene turned about the vertical."""
-    c, s = np.cos(heading), np.sin(heading)
-
-    def about(v: list[float]) -> list[float]:
-        return [float(c * v[0] - s * v[1]), float(s * v[0] + c * v[1]), *v[2:]]
-
-    bed = tables["environment"]["seabed"]
-    bed["slope"] = about(bed["slope"])
-    for point in tables["points"].values():
-        point["position"] = about(point["position"])
-    return tables
+    return seen_by(Rotation.from_euler("z", heading).as_matrix(), tables)
 
 
 def folds(result: hybrid.Result) -> float:

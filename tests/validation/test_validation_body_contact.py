@@ -12,23 +12,19 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.errors import Outcome, SceneError
-from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, V, W
-from hybrid.kernels.laws.obstacles import stored_energy
-from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.state.books import blank_books
-from hybrid.kernels.state.report import EACH, FORCE, STIFFNESS
-from hybrid.model.bodies import body_model
-from hybrid.model.build import build
+from hybrid.errors import SceneError
+from hybrid.kernels.junctions.bodies import PLACE, V, W
+from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_system
 from hybrid.scene.bodies import FreeBody, turned
 from hybrid.scene.network import Network
-from hybrid.scene.read import as_scene, one_line
+from hybrid.scene.read import as_scene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.solve.network_solver import NetworkSolver
-from hybrid.solve.stepper import JoinedLine, NetworkState
+from hybrid.solve.stepper import NetworkState
 from tests.combinations.pairs import seen_by
-from tests.scenes import cable_scene, line_between, network_scene
+from tests.scenes import line_between, network_scene
+from tests.validation.thrown_lines import straight, throw
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
 Tables = dict[str, Any]
@@ -362,81 +358,22 @@ def test_a_line_ignores_the_body_that_it_is_fixed_to_until_it_has_left_it() -> N
 # --- free flight ------------------------------------------------------------------------------------
 
 
-def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
-    """A line thrown at a ball: momenta before and after (2, 6) about the origin, energies, final states, largest push."""
-    section = {"length": 3.0, "mass": 0.4, "diameter": 0.02, "bending_stiffness": 0.1, "axial_stiffness": 2e5,
-               "torsional_stiffness": 0.08}  # fmt: skip
-    body = FreeBody(
-        initial_guess=(1.2, 0.3, 0.0), initial_rotation=(10, 20, 30), mass=2.0, inertia=(0.1, 0.2, 0.25),
-        centre=(0.05, 0.02, -0.03), shape={"kind": "sphere", "radius": 0.3, "friction": friction, "stiffness": 1e4},
-    )  # fmt: skip
-    model = build(one_line(hybrid.validate_scene(cable_scene(
-        section, "free", "free", gravity=1e-15, contact={"self": False}, model="rod", mesh=60, dimension=3,
-        initial={"kind": "points", "points": [[0, 0, 0.35], [3, 0, 0.35]]}, obstacles=body.surface("ball"),
-        time=(1.0, 0.1)
-    ))))  # fmt: skip
-    state = model.start.copy()
-    state.v[:] = (0.5, 0.0, -4.0)
-    one = body_model("ball", body, 0.0, 0.0)
-    x = JoinedLine(
-        model.line, model.sea.at_time(0.0), model.ends.at_time(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
-        rides=np.zeros(1, np.int64),
-    )  # fmt: skip
-    solver = NetworkSolver([x], 0, one.numbers[None])
-    books = [blank_books(60)]
-    books[0].clock.shortest = 1e-9
-    solver.keep_books(books)
-    row = np.zeros((1, STATE))
-    row[0] = one.start
-    row[0, W : W + 3] = (0.5, -1.0, 2.0)
-    old = NetworkState([state], row)
-    solver.consistent_accelerations(old, [np.zeros((2, 3))])
-
-    def momenta(states: NetworkState) -> Any:
-        line, b = states.lines[0], states.bodies[0]
-        R, p = b[FRAME:V].reshape(3, 3), model.line.mass[:, None] * line.v
-        both = one.numbers[:36].reshape(6, 6) @ np.concatenate([R.T @ b[V : V + 3], b[W : W + 3]])
-        linear, angular = R @ both[:3], R @ both[3:]
-        turning = np.cross(line.r, p).sum(axis=0) + np.cross(b[PLACE:FRAME], linear) + angular
-        return np.concatenate([p.sum(axis=0) + linear, turning])
-
-    def energy(states: NetworkState) -> float:
-        line, b, parts = states.lines[0], states.bodies[0], np.zeros(5)
-        room = np.zeros((61, 3))
-        observe(
-            model.line, x.ends, line.e, line.v, line.a1, line.w, line.T, line.turn, Observed(room, room.copy(), parts)
-        )
-        nu = np.concatenate([b[FRAME:V].reshape(3, 3).T @ b[V : V + 3], b[W : W + 3]])
-        stored = float(stored_energy(model.line, x.sea, line.r))
-        return float(parts[:4].sum() + 0.5 * nu @ one.numbers[:36].reshape(6, 6) @ nu) + stored
-
-    new, t, before, rho, part, most = old.copy(), 0.0, 0.0, 0.9, step, 0.0
-    first, energies = momenta(old), [energy(old)]
-    while t < 0.25 * (1.0 - 1e-9):
-        x.sea.now[0] = t + part
-        taken = solver.step(old, new, part, 0.9, before, rho, t + part)
-        if taken.outcome != Outcome.OK:
-            part *= 0.5
-            assert part > 1e-5 * step, taken
-            continue
-        old, new, before, rho, t = new, old, part, taken.rho, t + part
-        energies.append(energy(old))
-        most = max(most, float(np.linalg.norm(old.lines[0].grip.reshape(61, EACH)[:, FORCE:].sum(axis=0))))
-        part = min(2.0 * part, step)
-    return np.stack([first, momenta(old)]), energies, old, most
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_a_thrown_line_gives_a_ball_what_it_loses(friction: float) -> None:
     """Momentum to 1e-6 of what the line brings, and energy never above 1.001 of what there was.
 
     Angular momentum is kept as well as steps keep that of a free line.
     """
-    momenta, energies, last, most = thrown(friction, 0.001)
-    brought = 3.0 * 0.4 * 4.0
-    assert most > 2.0 and np.linalg.norm(last.bodies[0, V : V + 3]) > 0.1
-    assert np.abs(momenta[1, :3] - momenta[0, :3]).max() < 1e-6 * brought
-    assert np.abs(momenta[1, 3:] - momenta[0, 3:]).max() < 1e-3 * brought
+    body = FreeBody(
+        initial_guess=(1.2, 0.3, 0.0), initial_rotation=(10, 20, 30), mass=2.0, inertia=(0.1, 0.2, 0.25),
+        centre=(0.05, 0.02, -0.03), shape={"kind": "sphere", "radius": 0.3, "friction": friction, "stiffness": 1e4},
+    )  # fmt: skip
+    line = straight(3.0, np.array([1.5, 0.0, 0.35]), np.array([1.0, 0.0, 0.0]), 60)
+    found = throw([line], [np.tile([0.5, 0.0, -4.0], (61, 1))], 0.001, 0.25, body=body)
+    brought, energies = 3.0 * 0.4 * 4.0, found.energies
+    assert np.linalg.norm(found.states.bodies[0, V : V + 3]) > 0.1
+    assert np.abs(np.diff(found.momentum, axis=0)).max() < 1e-6 * brought
+    assert np.abs(np.diff(found.turning, axis=0)).max() < 1e-3 * brought
     assert min(energies) / energies[0] > 0.8 and max(energies) < 1.001 * energies[0]
 
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from problems import momenta
 
 import hybrid
 from hybrid.errors import Outcome
@@ -48,7 +49,7 @@ class Throw(NamedTuple):
     size: float  # kg m2/s, of that
     tries: int  # given up
     states: NetworkState
-    shared: SharedContact
+    shared: SharedContact | None
     model: list[Any]
     deepest: float  # in obstacles, nodes and chords, over what they may (kernels.laws.obstacles.depths_in_obstacles)
 
@@ -66,9 +67,10 @@ def throw(
 ) -> Throw:  # fmt: skip
     """Lines with nodes (N+1, 3) m and velocities (N+1, 3) m/s fly; steps (s) that fail are halved.
 
+    Several touch themselves and each other, one touches what is around.
     turn: (3, 3), of everything; body: a free one with a shape, which spins; obstacles: at rest, or that turn freely.
     """
-    models, lines, states = [], [], []
+    models, lines, states, several = [], [], [], len(shapes) > 1
     around = {"obstacles": obstacles if body is None else body.surface("ball")} if body or obstacles else {}
     rides = np.zeros(0 if body is None else 1, np.int64)
     own = () if body is None else (body_model("ball", body, 0.0, 0.0),)
@@ -79,7 +81,7 @@ def throw(
         r = r if turn is None else r @ turn.T
         s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
         model = build(one_line(hybrid.validate_scene(
-            cable_scene(section(float(s[-1]), width), "free", "free", gravity=1e-15, contact={"self": True}, model=kind,
+            cable_scene(section(float(s[-1]), width), "free", "free", gravity=1e-15, contact={"self": several}, model=kind,
                         mesh={"nodes": s.tolist()}, initial={"kind": "points", "points": r.tolist()}, dimension=3,
                         time=(1.0, 0.1)) | around
         )))  # fmt: skip
@@ -97,9 +99,11 @@ def throw(
         tuple(range(count)), np.ones((count, count), np.int64), np.full((count, count), friction),
         np.full((count, 2), -1, np.int64),
     )  # fmt: skip
-    lines = [x._replace(line=touching.bits(x.line)) for x in lines]
-    strands = [TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale) for x in models]
-    shared = SharedContact(touching, strands)
+    shared = None
+    if several:
+        lines = [x._replace(line=touching.bits(x.line)) for x in lines]
+        strands = [TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale) for x in models]
+        shared = SharedContact(touching, strands)
     solver = NetworkSolver(lines, 0, numbers, shared=shared)
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
@@ -109,7 +113,7 @@ def throw(
     solver.consistent_accelerations(old, [np.zeros((2, 3))] * count)
     new, t, before, rho, part, tries, deepest = old.copy(), 0.0, 0.0, 0.9, step, 0, -np.inf
     masses = [x.line.mass[:, None] for x in models]
-    first, energies, least = of(models, masses, old, numbers), [energy(models, old, shared, lines, numbers)], np.inf
+    first, energies, least = of(models, old, numbers), [energy(models, old, shared, lines, numbers)], np.inf
     apart = np.inf
     while t < duration * (1.0 - 1e-9):
         end = t + part
@@ -126,7 +130,7 @@ def throw(
         old, new, before, rho, t = new, old, end - t, taken.rho, end
         energies.append(energy(models, old, shared, lines, numbers))
         part = min(2.0 * part, step)
-    last = of(models, masses, old, numbers)
+    last = of(models, old, numbers)
     size = sum(
         float((np.linalg.norm(x.r, axis=1)[:, None] * m * np.abs(x.v)).sum())
         for x, m in zip(old.lines, masses, strict=True)
@@ -136,10 +140,10 @@ def throw(
 
 
 def energy(
-    models: list[Any], states: NetworkState, shared: SharedContact, lines: list[JoinedLine], bodies: Floats
+    models: list[Any], states: NetworkState, shared: SharedContact | None, lines: list[JoinedLine], bodies: Floats
 ) -> float:
     """Kinetic, elastic and contact energy, J, of lines and bodies."""
-    total = float(shared.contact.numbers.energy)
+    total = float(shared.contact.numbers.energy) if shared else 0.0
     for model, x, joined in zip(models, states.lines, lines, strict=True):
         parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
         observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(room, room.copy(), parts))
@@ -158,16 +162,12 @@ def _rates(row: Floats) -> Floats:
     return np.concatenate([row[FRAME:V].reshape(3, 3).T @ row[V : V + 3], row[W : W + 3]])
 
 
-def of(models: list[Any], masses: list[Floats], states: NetworkState, bodies: Floats) -> tuple[Floats, Floats]:
+def of(models: list[Any], states: NetworkState, bodies: Floats) -> tuple[Floats, Floats]:
     """Momentum and angular momentum about the origin, with that of the sections and of bodies."""
     momentum, turning = np.zeros(3), np.zeros(3)
-    for model, mass, x in zip(models, masses, states.lines, strict=True):
-        length = np.linalg.norm(x.e, axis=1)[:, None]
-        d, rate = x.e / length, np.diff(x.v, axis=0) / length
-        line = model.line
-        sections = line.polar[:, None] * x.w[:, None] * d + line.rotary[:, None] * np.cross(d, rate)
-        momentum += (mass * x.v).sum(axis=0)
-        turning += np.cross(x.r, mass * x.v).sum(axis=0) + sections.sum(axis=0)
+    for model, x in zip(models, states.lines, strict=True):
+        linear, angular = momenta(model, x)
+        momentum, turning = momentum + linear, turning + angular
     for numbers, row in zip(bodies, states.bodies, strict=True):
         R, both = row[FRAME:V].reshape(3, 3), numbers[:36].reshape(6, 6) @ _rates(row)
         momentum += R @ both[:3]
@@ -187,8 +187,10 @@ def nearest(before: NetworkState, after: NetworkState) -> float:
     return float(least)
 
 
-def nearest_curves(shared: SharedContact) -> float:
+def nearest_curves(shared: SharedContact | None) -> float:
     """The least distance, m, of the points of contact of the state that was looked at last; infinite: nothing touches."""
+    if shared is None:
+        return float(np.inf)
     contact = shared.contact
     return float(contact.points[: contact.counts.points, DISTANCE].min(initial=np.inf))
 
