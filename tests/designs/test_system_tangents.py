@@ -21,7 +21,6 @@ SECTION = {
 HEAVE = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 4.0}
 WAVES = {"kind": "jonswap", "significant_height": 3, "peak_period": 9, "seed": 1, "components": 12}
 OUTPUT = {"time": {"duration": 5.0, "step": 0.05}, "output": {"every": 0.25, "points": 21}}
-OF = ["max {}tension@end", "last {}tension@30", "std {}position.z@36", "t=3.31 {}tension@42"]
 
 
 def water(waves: bool, bed: bool = False) -> dict[str, Any]:

@@ -13,8 +13,6 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-RODS = ("rod", "adaptive")
-
 
 def rod(L: float, EI: float, mass: float = 1.0, **more: Any) -> dict[str, Any]:
     return {"length": L, "mass": mass, "bending_stiffness": EI, "torsional_stiffness": EI, **more}

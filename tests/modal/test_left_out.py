@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,19 @@ def test_the_size_of_a_vector_with_the_law_of_drag() -> None:
     assert shape(1.6, 0.4, 0.05, 0.0) < -0.05 < 0.0 < shape(2.4, 0.4, 0.02, 3.2)
 
 
+def in_waves(section: dict[str, Any], sea: dict[str, Any], *ends: dict[str, Any]) -> dict[str, Any]:
+    """A line between two ends in 100 m of water."""
+    fluid = {"density": 1025, "surface": 0, "waves": sea | {"direction": 30.0, "ramp": 10.0, "depth": 100.0}}
+    return cable_scene(section | {"added_mass": {"normal": 1.0}}, *ends, fluid=fluid, model="catenary", mesh=60)
+
+
+def deviations(scene: dict[str, Any], points: list[float], duration: float, step: float) -> np.ndarray:
+    """Standard deviations of curvature at points in a run, after 100 s."""
+    more = {"time": {"duration": duration, "step": step}, "output": {"every": 0.25, "points": points}}
+    with hybrid.run(scene | more) as result:
+        return np.asarray(result.curvature)[result.times > 100.0].std(axis=0)
+
+
 @pytest.mark.long
 def test_a_string_whose_bend_turns_over_in_waves_as_in_an_hour() -> None:
     """A taut leg near the surface: its curvature is drag over tension, not normal, and 1.6 standard deviations from 0.
@@ -108,19 +123,9 @@ def test_a_string_whose_bend_turns_over_in_waves_as_in_an_hour() -> None:
     A normal law would be 8 % too large.
     """
     rope = {"length": 133.7, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
-    waves = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 8.0, "direction": 30.0, "ramp": 10.0}
-    scene = cable_scene(
-        rope | {"added_mass": {"normal": 1.0}},
-        pinned_at(0, 0, -95),
-        pinned_at(100, 0, -5),
-        fluid={"density": 1025, "surface": 0, "waves": waves | {"depth": 100.0}},
-        model="catenary",
-        mesh=60,
-    )
-    line = hybrid.response(scene).lines["cable"]
-    output = {"every": 0.25, "points": [120.33, 127.015]}
-    with hybrid.run(scene | {"time": {"duration": 3600.0, "step": 0.15}, "output": output}) as result:
-        there = np.asarray(result.curvature)[result.times > 100.0].std(axis=0)
+    waves = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 8.0}
+    scene = in_waves(rope, waves, pinned_at(0, 0, -95), pinned_at(100, 0, -5))
+    line, there = hybrid.response(scene).lines["cable"], deviations(scene, [120.33, 127.015], 3600.0, 0.15)
     nodes = [int(np.abs(line.s - s).argmin()) for s in (120.33, 127.015)]
     here = line.deviation("curvature")[nodes]
     assert here == pytest.approx(there, rel=0.03)
@@ -134,21 +139,11 @@ def test_fast_bends_across_hide_nothing_of_a_quiet_bend() -> None:
     Measured by both directions together, a tenth of what is left out would be told.
     """
     section = {"length": 60.0, "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "drag": {"normal": 1.2}}
-    waves = {"kind": "jonswap", "significant_height": 1.0, "peak_period": 5.0, "direction": 30.0, "ramp": 10.0}
-    scene = cable_scene(
-        section | {"added_mass": {"normal": 1.0}},
-        pinned_at(0, 0, -65),
-        pinned_at(6, 0, -5.15),
-        fluid={"density": 1025, "surface": 0, "waves": waves | {"depth": 100.0}},
-        model="catenary",
-        mesh=60,
-    )
+    waves = {"kind": "jonswap", "significant_height": 1.0, "peak_period": 5.0}
+    scene = in_waves(section, waves, pinned_at(0, 0, -65), pinned_at(6, 0, -5.15))
     found = hybrid.response(scene)
     line, nodes = found.lines["cable"], [3, 4, 6]
-    output = {"every": 0.25, "points": [3.0, 4.0, 6.0]}
-    with hybrid.run(scene | {"time": {"duration": 700.0, "step": 0.1}, "output": output}) as result:
-        there = np.asarray(result.curvature)[result.times > 100.0].std(axis=0)
-    added = there / line.deviation("curvature")[nodes] - 1.0
+    added = deviations(scene, [3.0, 4.0, 6.0], 700.0, 0.1) / line.deviation("curvature")[nodes] - 1.0
     assert line.left_out["curvature"][nodes] == pytest.approx(added, rel=0.3)
     assert not line.resolved("curvature")[nodes].any() and not found.valid_for("curvature")
 

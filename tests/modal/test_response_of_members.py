@@ -11,7 +11,7 @@ import hybrid
 from hybrid.linear.loaded_line import turning_doubts
 from hybrid.linear.response_results import of_few, phases_of
 from tests.scenes import line_between, network_scene
-from tests.simulation.test_vortices import RHO_MEMBER, G, body, floating, scene
+from tests.simulation.test_vortices import G, body, floating, scene, small_body
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
 CHAIN = {"mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
@@ -76,18 +76,7 @@ def test_a_spar_through_the_surface_swings_as_in_time():
 
 def test_a_small_body_goes_with_the_water():
     """Three cylinders across each other, each direction across two of them: (1 + 2/3 Ca) a = 2/3 (1 + Ca) a_water."""
-    ends = ([-0.1, 0, 0], [0.1, 0, 0]), ([0, -0.1, 0], [0, 0.1, 0]), ([0, 0, -0.1], [0, 0, 0.1])
-    members = [{"start": a, "end": b, "diameter": 0.1, "added_mass": 1.0, "pieces": 2} for a, b in ends]
-    volume = 3 * 0.25 * math.pi * 0.01 * 0.2
-    given = body(
-        members=members, mass=RHO_MEMBER * volume, volume=volume, inertia=[0.1, 0.1, 0.1], initial_guess=[0, 0, -50]
-    )
-    waves = {"kind": "regular", "height": 1.0, "period": 8.0}
-    made = scene({"surface": 0.0, "waves": waves}, given)
-    soft = {"length": 59.0, "mass": 1e-4, "diameter": 3e-4, "axial_stiffness": 0.05, "max_strain": 0.9}
-    made["points"]["west"]["position"], made["points"]["east"]["position"] = [-61, 0, -10], [61, 0, -10]
-    for line in made["lines"].values():
-        line["sections"] = [soft]
+    made, _ = small_body(50.0, {})
     with hybrid.static(made) as rest:
         depth = -rest["bodies/it/position"][-1, 2]
     moved = hybrid.response(made).bodies["it"][0]

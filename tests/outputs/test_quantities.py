@@ -369,7 +369,6 @@ def test_refused_of_several_lines(change: str, match: str) -> None:
 
 # --- The elevation of the sea as an output: of a regular wave by its formula, of many components by their sum ---
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 PLACES = [[0.0, 0.0], [30.0, 10.0], [-12.5, 4.0]]
 LINE = """
 environment: {{fluid: {{density: 1025, surface: 0, waves: {waves}}}}}

@@ -31,7 +31,6 @@ LINES: dict[str, Any] = network_scene(
 
 SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
 TORQUE = {SECTION + "tension_torque": 1e-3}
-BALL: dict[str, Any] = {"obstacles": {"ball": {"kind": "sphere", "at": [4, 0, -9], "radius": 1}}}
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
 TWO = {SECTION + "bending_stiffness": [10, 20], END + "normal": [0, 1, 0]}
@@ -46,7 +45,6 @@ ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
-CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 OTHER_LINE = {"start": "a", "end": "b", "sections": [{"length": 9.5, "mass": 1, "diameter": 0.02}]}
 TWO_LINES = {"lines.two": OTHER_LINE, "contact": {}}
 

@@ -202,7 +202,6 @@ def test_wavenumber_at_its_limits() -> None:
 
 BODY = "{kind: body, initial_guess: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}"
 POWER = "{kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, veer: 30.0, ramp: 5.0}"
-JONSWAP = "{kind: jonswap, significant_height: 3.0, peak_period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}"
 REGULAR = "{kind: regular, height: 2.0, period: 7.0, direction: 30.0, phase: 90.0, depth: 60.0}"
 PROFILE = (
     "{kind: profile, table: [{z: 0.0, velocity: [0.4, 0.0, 0.0]}, {z: -50.0, velocity: [0.1, 0.2, 0.0]}], ramp: 8.0}"
@@ -217,7 +216,6 @@ LIST = "[{z: -100.0, velocity: [0.0, 0.0, 0.0]}, {z: 0.0, velocity: [0.3, 0.0, 0
 CALM = change(SEA_LIST, f"current: {LIST}", "current: [0, 0, 0]")
 POINTS = "[[10.0, 0.0, 0.0], [10.0, 0.0, -20.0], [0.0, 0.0, -35.0]]"
 HEAVE = "{heave: {amplitude: 2.0, period: 8.0}, ramp: 16.0}"
-TRAVEL = "travel: {by: [10.0, 0.0, -2.0], over: 30.0, begin: 5.0}"
 GUESS = "guess: straight, direction: [1.0, 0.0, 0.0]"
 FREE = "{kind: free}"
 HELD = "{kind: pinned, position: [0.0, 0.0, 0.0]}"

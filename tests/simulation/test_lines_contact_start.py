@@ -15,7 +15,7 @@ from hybrid.kernels.state.books import PARTS_ITSELF
 from hybrid.model.network import build_system
 from hybrid.simulation import run_record
 from tests.scenes import line_between, network_scene
-from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, crossing, lowered
+from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, bridle, crossing, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
 
 Tables = dict[str, Any]
@@ -84,19 +84,6 @@ def test_where_contact_is_off_or_an_accuracy_is_asked_lines_pass_and_that_is_sai
     thin = deepcopy(unasked())
     del thin["lines"]["lower"]["sections"][0]["diameter"]
     assert build_system(system_of(thin)).may_meet == ()
-
-
-def bridle(half: float, fall: float = 0.0) -> Tables:
-    """Two legs that leave a knot by a narrow angle, half of it by half (m) over 0.8 m, and may swing together."""
-    leg = {"sections": [ROPE | {"length": 0.81}], "mesh": {"cells": 80}, "contact": {"self": False}}
-    move = {"travel": {"by": [0, fall, 0], "over": 0.3}}
-    return {
-        "environment": {"gravity": 9.81}, "time": {"duration": 0.4, "step": 0.01}, "output": {"points": 21, "every": 0.1},
-        "points": {"a": {"position": [0, -half, 0]}, "b": {"position": [0, half, 0]} | ({"motion": move} if fall else {}),
-                   "c": {"position": [1.6, 0, 0]}, "knot": {"kind": "free", "initial_guess": [0.8, 0, 0]}},
-        "lines": {"left": leg | {"start": "a", "end": "knot"}, "right": leg | {"start": "b", "end": "knot"},
-                  "tow": leg | {"start": "knot", "end": "c"}},
-    }  # fmt: skip
 
 
 @pytest.mark.parametrize("half", [0.02, 0.05, 0.1])

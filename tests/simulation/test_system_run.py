@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_system_saving import spar
+import test_system_saving as saving
+from test_system_saving import SEA, spar
 
 import hybrid
 from hybrid.errors import ComputationError, ResultError
@@ -17,8 +18,6 @@ from hybrid.simulation import progress, run_of_lines
 from hybrid.simulation import run as run_module
 from tests.scenes import line_between, network_scene
 
-WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
-SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
 SECTION = {"length": 108, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 BODY = {"mass": 400, "volume": 3.0, "height": 2.0, "drag_area": 2.0, "added_mass": 300}
 PINNED = {"position": [0, 0, -100.0]}
@@ -37,19 +36,12 @@ def buoy(**tables: Any) -> dict[str, Any]:
 
 def mooring(**tables: Any) -> dict[str, Any]:
     """Two legs from the seabed to a float, and a hose with bending from there to a vessel that heaves."""
-    leg = SECTION | {"length": 140, "added_mass": {"normal": 1.0}}
-    heave = {"heave": {"amplitude": 1.5, "period": 8}, "ramp": 6}
-    return network_scene(
-        {"west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
-         "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3},
-         "vessel": {"position": [70, 0, 2], "motion": heave}},
-        {"west": line_between("west", "float", leg, mesh=30), "east": line_between("float", "east", leg, mesh=30),
-         "hose": line_between("float", "vessel",
-                              {"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6,
-                               "bending_stiffness": 300, "drag": {"normal": 1.1}, "max_tension": 3000},
-                              mesh=30)},
-        title="float", environment=SEA | {"seabed": {"z": -100, "stiffness": 5000}}, time=TIME
-    ) | tables  # fmt: skip
+    scene = saving.mooring(environment=SEA | {"seabed": {"z": -100, "stiffness": 5000}}, time=TIME)
+    del scene["points"]["float"]["force"]
+    for leg in ("west", "east"):
+        scene["lines"][leg]["sections"] = [saving.LEG | {"added_mass": {"normal": 1.0}}]
+    scene["lines"]["hose"]["sections"] = [saving.HOSE | {"drag": {"normal": 1.1}, "max_tension": 3000}]
+    return scene | tables
 
 
 @pytest.fixture(scope="module")

@@ -315,27 +315,29 @@ def test_a_body_is_slowed_down_as_drag_and_added_mass_say() -> None:
         assert v[0] == pytest.approx(first / (1.0 + c * first * 0.09 / m), rel=0.01)
 
 
-def test_waves_carry_a_small_body_along_with_the_water() -> None:
-    """As heavy as its water and with Ca = 1: (m + m) a = (1 + 1) m a_water: it moves as the water at its place."""
-    waves = {"kind": "regular", "height": 1.0, "period": 8.0, "ramp": 16.0}
+def small_body(depth: float, waves: dict[str, Any], **tables: Any) -> tuple[dict[str, Any], float]:
+    """A body as heavy as its water between soft lines, and its volume, m3.
+
+    Three cylinders across each other: each direction is across two of them.
+    """
     ends = ([-0.1, 0, 0], [0.1, 0, 0]), ([0, -0.1, 0], [0, 0.1, 0]), ([0, 0, -0.1], [0, 0, 0.1])
     members = [{"start": a, "end": b, "diameter": 0.1, "drag": 0.0, "added_mass": 1.0, "pieces": 2} for a, b in ends]
-    volume = 3 * 0.25 * np.pi * 0.01 * 0.2
-    # three cylinders across each other: each direction is across two of them
+    volume = 3 * 0.25 * pi * 0.01 * 0.2
     given = body(
-        members=members, mass=RHO_MEMBER * volume, volume=volume, inertia=[0.1, 0.1, 0.1], initial_guess=[0, 0, -10]
+        members=members, mass=RHO_MEMBER * volume, volume=volume, inertia=[0.1, 0.1, 0.1], initial_guess=[0, 0, -depth]
     )
-    given["mass"] = RHO_MEMBER * volume
     soft = {"length": 59.0, "mass": 1e-4, "diameter": 3e-4, "axial_stiffness": 0.05, "max_strain": 0.9}
-    made = scene(
-        {"surface": 0.0, "waves": waves},
-        given,
-        time={"duration": 40.0, "step": 0.05},
-        output={"every": 0.5, "points": 3},
-    )
+    made = scene({"surface": 0.0, "waves": {"kind": "regular", "height": 1.0, "period": 8.0} | waves}, given, **tables)
     made["points"]["west"]["position"], made["points"]["east"]["position"] = [-61, 0, -10], [61, 0, -10]
     for line in made["lines"].values():
         line["sections"] = [soft]
+    return made, volume
+
+
+def test_waves_carry_a_small_body_along_with_the_water() -> None:
+    """As heavy as its water and with Ca = 1: (m + m) a = (1 + 1) m a_water: it moves as the water at its place."""
+    time = {"time": {"duration": 40.0, "step": 0.05}, "output": {"every": 0.5, "points": 3}}
+    made, volume = small_body(10.0, {"ramp": 16.0}, **time)
     with hybrid.run(made) as result:
         w = 2 * np.pi / 8.0
         k = w * w / G

@@ -62,13 +62,12 @@ def straight(length: float, at: Floats, along: Floats, cells: int) -> Floats:
 
 def throw(
     shapes: list[Floats], speeds: list[Floats], step: float, duration: float, friction: float = 0.0,
-    width: float = WIDTH, kind: str = "rod", turn: Floats | None = None, body: FreeBody | None = None,
-    obstacles: dict[str, Any] | None = None,
+    kind: str = "rod", body: FreeBody | None = None, obstacles: dict[str, Any] | None = None,
 ) -> Throw:  # fmt: skip
     """Lines with nodes (N+1, 3) m and velocities (N+1, 3) m/s fly; steps (s) that fail are halved.
 
     Several touch themselves and each other, one touches what is around.
-    turn: (3, 3), of everything; body: a free one with a shape, which spins; obstacles: at rest, or that turn freely.
+    body: a free one with a shape, which spins; obstacles: at rest, or that turn freely.
     """
     models, lines, states, several = [], [], [], len(shapes) > 1
     around = {"obstacles": obstacles if body is None else body.surface("ball")} if body or obstacles else {}
@@ -78,15 +77,14 @@ def throw(
     rows = np.array([x.start for x in own]).reshape(len(own), STATE)
     rows[:, W : W + 3] = (0.5, -1.0, 2.0)
     for r, v in zip(shapes, speeds, strict=True):
-        r = r if turn is None else r @ turn.T
         s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
         model = build(one_line(hybrid.validate_scene(
-            cable_scene(section(float(s[-1]), width), "free", "free", gravity=1e-15, contact={"self": several}, model=kind,
+            cable_scene(section(float(s[-1])), "free", "free", gravity=1e-15, contact={"self": several}, model=kind,
                         mesh={"nodes": s.tolist()}, initial={"kind": "points", "points": r.tolist()}, dimension=3,
                         time=(1.0, 0.1)) | around
         )))  # fmt: skip
         state = model.start.copy()
-        state.v[:] = v if turn is None else v @ turn.T
+        state.v[:] = v
         x = JoinedLine(
             model.line, model.sea.at_time(0.0), model.ends.at_time(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
             rides=rides,

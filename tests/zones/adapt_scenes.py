@@ -86,20 +86,21 @@ def kinking(**more: Any) -> Scene:
     return breathing(9.9, 8.0, {"tolerance": 0.006} | more.pop("model", {}), mass=0.1, attachments=clump, **more)
 
 
-def nodding(**more: Any) -> Scene:
-    """A taut cable whose clamp nods by 20 deg and back: sqrt(EI/T) 2 sin(angle/2) to 2.5 times the tolerance."""
-    model = {"kind": "adaptive", "hold_time": DWELL, "tolerance": 0.0015} | more.pop("model", {})
-    cable = {
-        "length": LENGTH, "mass": 0.2, "bending_stiffness": EI, "torsional_stiffness": 0.8 * EI,
-        "axial_stiffness": 1e5, "damping": {"mass": 3.0},
-    } | more  # fmt: skip
-    clamp = {"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0), "normal": (0, 0.6, 0.8)}
-    clamp["motion"] = {"yaw": {"amplitude": 20.0, "period": 10.0}, "ramp": 2.0}
+def taut(start: Any, end: Any, duration: float, model: dict[str, Any], **cable: Any) -> Scene:
+    section = {"length": LENGTH, "bending_stiffness": EI, "axial_stiffness": 1e5, "damping": {"mass": 3.0}} | cable
     what = scene(
-        cable, clamp, pinned(10.008, 0, 0), cells=CELLS, gravity=GRAVITY, time={"duration": 6.0, "step": 0.02},
+        section, start, end, cells=CELLS, gravity=GRAVITY, time={"duration": duration, "step": 0.02},
         output={"every": 0.02, "points": np.linspace(0, LENGTH, 2 * CELLS + 1).tolist()},
     ).model_dump(exclude_none=True)  # fmt: skip
-    return Scene.model_validate(what | {"model": model})
+    return Scene.model_validate(what | {"model": {"kind": "adaptive", "hold_time": DWELL} | model})
+
+
+def nodding(**more: Any) -> Scene:
+    """A taut cable whose clamp nods by 20 deg and back: sqrt(EI/T) 2 sin(angle/2) to 2.5 times the tolerance."""
+    model = {"tolerance": 0.0015} | more.pop("model", {})
+    clamp = {"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0), "normal": (0, 0.6, 0.8)}
+    clamp["motion"] = {"yaw": {"amplitude": 20.0, "period": 10.0}, "ramp": 2.0}
+    return taut(clamp, pinned(10.008, 0, 0), 6.0, model, **{"mass": 0.2, "torsional_stiffness": 0.8 * EI} | more)
 
 
 def lowering(**more: Any) -> Scene:
@@ -125,18 +126,8 @@ def easing(normal: tuple[float, float, float], **more: Any) -> Scene:
 
 def turning(**more: Any) -> Scene:
     """A taut cable between two clamps, one of which turns about its tangent: M^2/(4 EI T)/0.5 of the rod is 2.5 at the end."""
-    cable = {
-        "length": LENGTH, "mass": 0.1, "bending_stiffness": EI, "torsional_stiffness": 20 * EI,
-        "axial_stiffness": 1e5, "damping": {"mass": 3.0},
-    }  # fmt: skip
     end = clamped((10.002, 0, 0), (1, 0, 0), motion={"roll": {"amplitude": 720.0, "period": 12.0}, "ramp": 2.0})
-    what = scene(
-        cable, clamped(), end, cells=CELLS, gravity=GRAVITY, time={"duration": 3.0, "step": 0.02},
-        output={"every": 0.02, "points": np.linspace(0, LENGTH, 2 * CELLS + 1).tolist()},
-    ).model_dump(exclude_none=True)  # fmt: skip
-    return Scene.model_validate(
-        what | {"model": {"kind": "adaptive", "hold_time": DWELL, "tolerance": 0.01} | more["model"]}
-    )
+    return taut(clamped(), end, 3.0, {"tolerance": 0.01} | more["model"], mass=0.1, torsional_stiffness=20 * EI)
 
 
 SCENES = {"slack": slackening, "deep": sagging, "bend": bending, "point": kinking, "clamp": nodding, "edge": lowering}
