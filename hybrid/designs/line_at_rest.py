@@ -18,8 +18,9 @@ from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.report import FRICTION, MOMENT_A, NET_A, PLANAR, WAVES
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
-from hybrid.linear.matrices import ANCHOR, load_layers, rotation
+from hybrid.linear.matrices import ANCHOR, load_layers
 from hybrid.model.build import Model
+from hybrid.model.ends import rotation
 from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene

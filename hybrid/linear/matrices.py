@@ -56,6 +56,7 @@ from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, Stat
 from hybrid.kernels.step.step import friction_axes
 from hybrid.linear.touching import Blocks, TouchingLines, TouchingParts, hats, touching_parts
 from hybrid.model.bodies import Members
+from hybrid.model.ends import rotation
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
 from hybrid.solve.stepper import JoinedLine, NetworkState
@@ -405,12 +406,6 @@ def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tupl
             moment = report[MOMENT_A + 3 * k : MOMENT_A + 3 * k + 3] * (1.0 if k == 0 else -1.0)
             moments[:, axis] -= sign * moment / (2.0 * FRAME_TURN)
     return forces, moments
-
-
-def rotation(n: Floats) -> Floats:
-    """exp([n]x) of a small rotation vector, to the fourth order."""
-    S = hats(n)
-    return np.asarray(np.eye(3) + S + S @ S / 2.0 + S @ S @ S / 6.0)
 
 
 def linear_network(

@@ -239,16 +239,15 @@ class NetworkSolver(LineJobs):
 
     def step(
         self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float,
-        t: float = 0.0, most: int = MOST_OF_STEP, fixed: bool = False,
+        t: float = 0.0, most: int = MOST_OF_STEP,
     ) -> NetworkTaken:  # fmt: skip
         """From `old` to `new` (overwritten) over dt, with the ends and the sea of the new time in the lines' arrays.
 
         before, rho_before: the length, s, of the step that led to `old`, 0 if it is a start, and its spectral radius,
-        `NetworkTaken.rho` of it.  t: s, of `new`, for extremes.  fixed: whether steps have a fixed length, but for
-        parts of one.
+        `NetworkTaken.rho` of it.  t: s, of `new`, for extremes.
         """
         limits = Limits(REACH * self.length, 1.0, most, self.tolerance)
-        task = Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before, fixed=fixed)
+        task = Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before)
         taken = self._solve(task, old, new, t)
         if taken.outcome != Outcome.OK:
             return taken
