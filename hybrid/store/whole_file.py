@@ -130,7 +130,9 @@ def groups_of(contents: ArrayContents) -> Iterator[tuple[str, ArrayContents]]:
         yield f"{GROUP}/{name}/", part
 
 
-def image_of_result(contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool) -> bytearray:
+def image_of_result(
+    contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool
+) -> bytes | bytearray:
     """The bytes of the file of a result, with the rows that it has.
 
     restart: None: nobody can go on with it; outputs: their number if it is known, which only makes small files smaller;
@@ -161,6 +163,8 @@ def image_of_result(contents: ArrayContents, restart: Restart | None, outputs: i
         for number, data in restart.checkpoints.items():
             write_slot(slots, number, data)
         write_before(file, restart.before)
+    if not template.places:
+        return image_of(file)
     image = bytearray(image_of(file))
     for (group, name), places in template.places.items():
         values = groups[group].data[name].values

@@ -371,7 +371,7 @@ class Recorder(Rows):
         """Let readers see a file, with all that there is now."""
         self._continue_in(image_of_result(self.contents(), self._restart(), self._outputs_known, False))
 
-    def _continue_in(self, made: bytearray | Callable[[Path], None]) -> None:
+    def _continue_in(self, made: bytes | bytearray | Callable[[Path], None]) -> None:
         """Write to a new file from now on; made: as of `created`."""
         assert self.path is not None
         self._broken = True  # until there is a file
