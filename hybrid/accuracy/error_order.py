@@ -40,9 +40,6 @@ RUBBING_ORDERS = (1.0, ORDERS[1])
 # So it is where a ramp has set off vibrations along the line and a halving of cells and steps leaves more than this of
 # what forces at the ends differ by, root mean square: less than first order.
 BELOW_FIRST = 0.6
-# Runs that differ in a force at an end by more than this part of its largest are too coarse to show an order above
-# ORDER: a difference that falls from three times the force to half of it would be of order 2.7.
-TOO_COARSE = 1.0
 # A low order is taken back where a finer run changes the force by less than this part of what it foretold, on average
 # and at most: of runs three times as fine, order 1 makes 1.2 of it, ORDER 0.76 and order 2 0.44.
 CONFIRMED = 0.6
@@ -65,7 +62,6 @@ class Falls(NamedTuple):
     largest: float
     change: float  # root mean square of the difference of the last two
     before: float  # the same of the first two
-    part: float = 0.0  # largest difference of the first two over the largest value of the last
 
 
 def falls(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample | None) -> Falls:
@@ -75,18 +71,15 @@ def falls(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample |
     values, every = coarsest.values[name], coarsest.every
     final, middle = (every_of(len(x.values[name]), every // x.every) for x in (result, coarse))
     rows, sums, largest = max(1, MOST // int(np.prod(values.shape[1:]))), np.zeros(2), np.zeros(2)
-    most = 0.0
     for a in range(0, len(values), rows):  # of all times: peaks jump about
         between, now = coarse.some(name, middle[a : a + rows]), result.some(name, final[a : a + rows])
-        most = float(np.max(magnitude(now, name), initial=most))
         for k, change in enumerate((now - between, between - values[a : a + rows])):
             sums[k] += squares(change)
             largest[k] = np.max(magnitude(change, name), initial=largest[k])
     if not (sums > 0.0).all():
         return Falls(np.nan, np.nan, np.nan, np.nan)
     mean = np.sqrt(sums / max(1, int(np.prod(values.shape))))
-    part = float(largest[1] / most) if most > 0.0 else 0.0
-    return Falls(float(mean[0] / mean[1]), float(largest[0] / largest[1]), float(mean[0]), float(mean[1]), part)
+    return Falls(float(mean[0] / mean[1]), float(largest[0] / largest[1]), float(mean[0]), float(mean[1]))
 
 
 def refinement(result: Resolution, coarse: Resolution) -> tuple[float, float]:
@@ -123,7 +116,7 @@ def as_halved(found: Falls, finer: tuple[float, float], share: float) -> Falls:
         return float(COARSER ** (-0.5 * (low + high))) if not np.isnan(left) else left
 
     mean = halved(found.mean)
-    return Falls(mean, halved(found.largest), mean * found.before, found.before, found.part)
+    return Falls(mean, halved(found.largest), mean * found.before, found.before)
 
 
 def force_orders(found: Falls, from_rest: bool = True, shaken: bool = False) -> tuple[float, float]:
@@ -131,8 +124,7 @@ def force_orders(found: Falls, from_rest: bool = True, shaken: bool = False) -> 
 
     from_rest: in a motion from an equilibrium; shaken: in which a ramp sets off vibrations along the line that matter.
     """
-    low, high = ORDERS if from_rest and not (shaken and found.mean > BELOW_FIRST) else START_ORDERS
-    return low, ORDER if found.part > TOO_COARSE else high
+    return ORDERS if from_rest and not (shaken and found.mean > BELOW_FIRST) else START_ORDERS
 
 
 def order(found: float, bounds: tuple[float, float]) -> float:
