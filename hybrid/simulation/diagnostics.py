@@ -220,6 +220,8 @@ class Diagnostics:
             s, tension = float(self._model.line.s[slack]), float(state.T[slack])
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
             self.note(0.0, slack, "slack", f"{text}: it stands like a strut, which no cable does")
+        else:
+            self.tension(0.0, state)
         self._compressed(state)
         if (lies := slack_text_of(self._model, state)) is not None:
             self.events.event(0.0, lies[0], lies[1], "slack", lies[2])

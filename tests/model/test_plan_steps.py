@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,7 +10,6 @@ import hybrid
 from hybrid.accuracy import run_forecast
 from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
 from hybrid.cli.plan_tables import plan_rows
-from hybrid.scene.read import as_scene
 from hybrid.scene.root import LINE, in_full
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -61,10 +58,9 @@ def test_its_words_are_those_of_the_cable(name: str, own: str) -> None:
         assert said[1][key].startswith(begin), key
 
 
-@pytest.mark.parametrize("form", [as_scene, in_full])
-def test_what_the_first_steps_show_is_in_the_plan(form: Callable[[Any], hybrid.Scene]) -> None:
+def test_what_the_first_steps_show_is_in_the_plan() -> None:
     """Cells that the mesh pre-run grades, and steps, are those of the result; without it they come from tables."""
-    asked = form(scene("3%"))
+    asked = scene("3%")
     hybrid.run(asked)  # compiles what it needs
     plan, guess = hybrid.plan(asked), hybrid.plan(asked, measure=False)
     ((_, line),) = plan.each_line()

@@ -55,19 +55,15 @@ def scene(rao: str, waves: dict[str, Any] = WAVES, clamped: bool = False, **vess
     ))  # fmt: skip
 
 
-def test_a_vessel_that_heaves_with_the_surface_at_its_origin(tmp_path: Path) -> None:
-    """Heave 1 m/m without lag: the fairlead is as high as the surface at the origin, the wave's ramp included."""
-    model = build(one_line(scene(table(tmp_path, {"heave": 1.0}))))
-    for t in (0.0, 3.0, 17.0, 25.0):
-        height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t)[0]
-        assert model.ends.at_time(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
+@pytest.mark.parametrize(("phase", "times"), [(0.0, (0.0, 3.0, 17.0, 25.0)), (90.0, (30.0, 33.3))])
+def test_a_vessel_that_heaves_with_the_surface_at_its_origin(phase: float, times: Any, tmp_path: Path) -> None:
+    """Heave 1 m/m: the fairlead is as high as the surface at the origin, the wave's ramp included.
 
-
-def test_phases_lag_behind_the_crest(tmp_path: Path) -> None:
-    """90 deg of lag is a quarter of a period."""
-    model = build(one_line(scene(table(tmp_path, {"heave": 1.0, "heave_phase": 90.0}))))
-    for t in (30.0, 33.3):
-        height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t - 9.0 / 4.0)[0]
+    Phases lag behind the crest: 90 deg are a quarter of a period.
+    """
+    model = build(one_line(scene(table(tmp_path, {"heave": 1.0} | ({"heave_phase": phase} if phase else {})))))
+    for t in times:
+        height = model.sea.elevation(ORIGIN[0], ORIGIN[1], t - 9.0 * phase / 360.0)[0]
         assert model.ends.at_time(t).position[1, 2] == pytest.approx(FAIRLEAD[2] + height, abs=1e-9)
 
 

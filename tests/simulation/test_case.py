@@ -352,26 +352,18 @@ def test_where_bends_are_judged_it_is_everywhere(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [ESTIMATION, REFINEMENT])
+@pytest.mark.parametrize(("name", "before"), [(ESTIMATION, False), (REFINEMENT, False), (REFINEMENT, True)])
 @pytest.mark.usefixtures("rough")
-def test_it_is_resumed_at_the_same_places(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_is_resumed_at_the_same_places(
+    name: str, before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A result of before goes on at all points: its checkpoint has errors at all of them."""
     Stopping(monkeypatch)
     scene = asked() | {"output": {"every": 0.1, "points": POINTS}}
-    hybrid.run(scene, tmp_path / "whole.h5").close()
-    stopped_in(name, scene, tmp_path / "run.h5")
-    hybrid.resume(tmp_path / "run.h5").close()
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
-
-
-@pytest.mark.long
-@pytest.mark.usefixtures("rough")
-def test_a_result_of_before_goes_on_at_all_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its checkpoint has errors at all of them."""
-    Stopping(monkeypatch)
-    scene = asked() | {"output": {"every": 0.1, "points": POINTS}}
-    with monkeypatch.context() as before:
-        before.setattr(run_sample, "MOST_PLACES", POINTS)
+    with monkeypatch.context() as patched:
+        if before:
+            patched.setattr(run_sample, "MOST_PLACES", POINTS)
         hybrid.run(scene, tmp_path / "whole.h5").close()
-        stopped_in(REFINEMENT, scene, tmp_path / "run.h5")
+        stopped_in(name, scene, tmp_path / "run.h5")
     hybrid.resume(tmp_path / "run.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []

@@ -145,28 +145,27 @@ def figures(scene: dict[str, Any], exact: dict[str, Any], *names: str) -> dict[s
     return out
 
 
-@pytest.mark.parametrize("rate", [0.8, -0.8])
-def test_errors_are_those_of_a_finer_run(rate: float) -> None:
-    scene = short("catenary", 2e6, rate=rate)
-    finer = short("catenary", 2e6, rate=rate, step=0.0125) | {"mesh": {"cells": 160}}
-    for name, ratio in figures(scene, finer, "position", "tension", "end_force_start", "end_force_end").items():
-        assert 0.7 < ratio < 3.0, name
+ENDS = ("end_force_start", "end_force_end")
+# A line, the same in shorter steps on more cells, and what is compared.
+FINER = {
+    **{f"rate {rate}": (short("catenary", 2e6, rate=rate),
+                        short("catenary", 2e6, rate=rate, step=0.0125) | {"mesh": {"cells": 160}},
+                        ("position", "tension", *ENDS)) for rate in (0.8, -0.8)},
+    # Eight nodes ride, and runs to compare with have not that many cells: fewer ride in them.
+    "few cells behind a clamp": (clamped(short("rod", 2e6, 2e4)) | {"mesh": {"cells": 24}},
+                                 clamped(short("rod", 2e6, 2e4, step=0.0125)) | {"mesh": {"cells": 96}},
+                                 ("position", "end_force_end")),
+    # Beside pins, whose layers results have, the rods to compare with are further off.
+    "neglected bending": (short("catenary", 2e6, 500.0), short("rod", 2e6, 500.0, step=0.0125) | {"mesh": {"cells": 160}},
+                          ("position", "curvature", "end_force_end")),
+}  # fmt: skip
 
 
-def test_errors_of_few_cells_behind_a_clamp() -> None:
-    """Eight nodes ride, and runs to compare with have not that many cells: fewer ride in them."""
-    scene = clamped(short("rod", 2e6, 2e4)) | {"mesh": {"cells": 24}}
-    finer = clamped(short("rod", 2e6, 2e4, step=0.0125)) | {"mesh": {"cells": 96}}
-    for name, ratio in figures(scene, finer, "position", "end_force_end").items():
-        assert 0.7 < ratio < 3.0, name
-
-
-def test_errors_of_neglected_bending_are_followed_while_line_comes() -> None:
-    """Of a catenary, against rods; beside pins, whose layers results have, the rods to compare with are further off."""
-    scene = short("catenary", 2e6, 500.0)
-    finer = short("rod", 2e6, 500.0, step=0.0125) | {"mesh": {"cells": 160}}
-    for name, ratio in figures(scene, finer, "position", "curvature", "end_force_end").items():
-        assert 0.7 < ratio < (4.0 if name == "curvature" else 3.0), name
+@pytest.mark.parametrize("name", FINER)
+def test_errors_are_those_of_a_finer_run(name: str) -> None:
+    scene, finer, quantities = FINER[name]
+    for quantity, ratio in figures(scene, finer, *quantities).items():
+        assert 0.7 < ratio < (4.0 if quantity == "curvature" else 3.0), quantity
 
 
 @pytest.mark.long

@@ -73,3 +73,12 @@ def test_friction_of_a_network_settles_while_its_current_grows() -> None:
     """A row of knots, buoys and lines that no step of the growing current led through at once."""
     found = hybrid.static(random_network(60)[1])
     assert not [event for event in found.events if event.kind == "static friction neglected"]
+
+
+def test_compression_that_friction_holds_is_told_at_rest() -> None:
+    """Leg 1 of random network 516 lies in compression on the bed, by less than the friction of a cell."""
+    leg = hybrid.static(random_network(516)[1]).lines["leg1"]
+    assert leg.tension.min() < -0.01 * leg.tension.max()
+    (told,) = [event for event in leg.events if event.kind == "slack"]
+    lowest = float(leg.s[int(np.argmin(leg.tension))])
+    assert "friction holds it on the seabed" in told.text and abs(told.s_a - lowest) < 3.0
