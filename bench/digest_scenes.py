@@ -1,6 +1,6 @@
 """Scenes of which the digests are kept: each way to compute a line once, short, on few cells.
 
-A scene is a file of the examples, or a system of this module, with values that are set; the name says what it covers.
+A scene is a file of the examples, or a network of this module, with values that are set; the name says what it covers.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def changed(data: Data, values: Data) -> Data:
 
 
 def _named(data: Data, name: str, model: Any) -> Data:
-    """A system one line of which has that model."""
+    """A network one line of which has that model."""
     return changed(data, {f"lines.{name}.model": model})
 
 
@@ -224,13 +224,13 @@ def moving() -> dict[str, Data]:
     )
     float_ = {"cable.attachments": [{"kind": "float", "at": 150, "buoyancy": 3000, "mass": 50, "drag_area": 0.5}]}
     found["a float, zones that move"] = changed(changed(fast, float_ | {"mesh.cells": 50}), ACROSS)
-    systems = _systems()
-    found |= {f"system {name}": data for name, data in systems.items()}
-    found["system buoy, hose whose zones move"] = _named(systems["buoy"], "hose", MOVES)
-    found["system buoy, hose as catenary"] = _named(systems["buoy"], "hose", CATENARY)
-    found["system parted, zones that move"] = _named(systems["parted"], "north", MOVES)
+    networks = _systems()
+    found |= {f"system {name}": data for name, data in networks.items()}
+    found["system buoy, hose whose zones move"] = _named(networks["buoy"], "hose", MOVES)
+    found["system buoy, hose as catenary"] = _named(networks["buoy"], "hose", CATENARY)
+    found["system parted, zones that move"] = _named(networks["parted"], "north", MOVES)
     for name, model in {"rod": RODS, "catenary": CATENARY, "moves": MOVES}.items():
-        found[f"system of one line, {name}"] = _named(systems["alone"], "line", model)
+        found[f"system of one line, {name}"] = _named(networks["alone"], "line", model)
         found[f"system of one line, {name}, in space"] = changed(found[f"system of one line, {name}"], ACROSS)
     return found
 

@@ -34,7 +34,7 @@ def plan_scene(seed: int) -> tuple[str, dict[str, Any]]:
 
 
 def lines_of(scene: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
-    """The same line twice, as a system: from its start to a free point with a weight, and from there to its end."""
+    """The same line twice, as a network: from its start to a free point with a weight, and from there to its end."""
     section = scene["cable"]["sections"][0]
     part = float(rng.uniform(0.3, 0.7))
     sections = [[section | {"length": x * section["length"]}] for x in (part, 1.0 - part)]

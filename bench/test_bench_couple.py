@@ -46,17 +46,17 @@ def surge(t: float) -> tuple[float, float]:
 
 def march(program: Any, path: Path) -> tuple[np.ndarray, float]:
     """Forces (nt, 3) N of the lines on the fairleads after each step, and the CPU time (s) of the steps."""
-    system = program.Create(str(path))
-    program.Init(system, PLACES, [0.0] * 9)
+    network = program.Create(str(path))
+    program.Init(network, PLACES, [0.0] * 9)
     out = []
     begin = time.process_time()
     for k in range(round(DURATION / STEP)):
         d, v = surge(k * STEP)
         x = [p + d * (i % 3 == 0) for i, p in enumerate(PLACES)]
-        forces = program.Step(system, x, [v * (i % 3 == 0) for i in range(9)], k * STEP, STEP)
+        forces = program.Step(network, x, [v * (i % 3 == 0) for i in range(9)], k * STEP, STEP)
         out.append(np.linalg.norm(np.reshape(forces, (3, 3)), axis=1))
     spent = time.process_time() - begin
-    program.Close(system)
+    program.Close(network)
     return np.array(out), spent
 
 

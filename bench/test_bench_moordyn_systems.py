@@ -151,16 +151,16 @@ def test_a_free_body_comes_to_rest_as_in_moordyn(tmp_path: Path) -> None:
     path.write_text(text)
     held = [80.0, 0.0, -100.0, -50.0, 75.0, -100.0, -40.0, -70.0, -100.0]
     place, pulls = np.zeros(6), np.zeros(3)  # means of the last 100 s
-    system = moordyn.Create(str(path))
+    network = moordyn.Create(str(path))
     try:
-        assert moordyn.Init(system, held, [0.0] * 9) == 0
+        assert moordyn.Init(network, held, [0.0] * 9) == 0
         for i in range(4000):
-            moordyn.Step(system, held, [0.0] * 9, 0.05 * i, 0.05)
+            moordyn.Step(network, held, [0.0] * 9, 0.05 * i, 0.05)
             if i >= 2000:
-                place += np.array(moordyn.GetBodyState(moordyn.GetBody(system, 1))[0][:6]) / 2000
-                pulls += [np.linalg.norm(moordyn.GetPointForce(moordyn.GetPoint(system, k))) / 2000 for k in (1, 2, 3)]
+                place += np.array(moordyn.GetBodyState(moordyn.GetBody(network, 1))[0][:6]) / 2000
+                pulls += [np.linalg.norm(moordyn.GetPointForce(moordyn.GetPoint(network, k))) / 2000 for k in (1, 2, 3)]
     finally:
-        moordyn.Close(system)
+        moordyn.Close(network)
     ours = np.concatenate([result["bodies/body1/position"][-1], result["bodies/body1/rotation"][-1]])
     turned = rotation_of(tuple(np.degrees(place[3:])))
     print(f"\nplace and turning: {ours.round(3)}, MoorDyn {place[:3].round(3)} {np.round(turned, 3)}")

@@ -1,4 +1,4 @@
-"""Equilibria of ten random systems of lines against MoorPy: quasi-static elastic catenaries on a bed without friction.
+"""Equilibria of ten random networks of lines against MoorPy: quasi-static elastic catenaries on a bed without friction.
 
 HYBRID_MOORPY names a Python that has MoorPy (`pip install moorpy` into an environment of its own):
 HYBRID_MOORPY=.../bin/python pytest bench/test_bench_moorpy.py -m bench -s
@@ -14,7 +14,7 @@ from peers.random_moorings import COUNT, DEPTH, by_moorpy, random_system, scene_
 
 import hybrid
 
-SAME = 1e-3  # of the largest tension of the system
+SAME = 1e-3  # of the largest tension of the network
 
 pytestmark = pytest.mark.bench
 
@@ -23,10 +23,10 @@ def test_equilibria_of_random_systems_are_those_of_moorpy() -> None:
     python = os.environ.get("HYBRID_MOORPY")
     if not python:
         pytest.skip("HYBRID_MOORPY names no Python with MoorPy")
-    systems = [random_system(seed) for seed in range(COUNT)]
+    networks = [random_system(seed) for seed in range(COUNT)]
     worst, laid = 0.0, 0.0
     print()
-    for seed, (given, theirs) in enumerate(zip(systems, by_moorpy(systems, python), strict=True)):
+    for seed, (given, theirs) in enumerate(zip(networks, by_moorpy(networks, python), strict=True)):
         result = hybrid.static(scene_of(given))
         ours = tensions_of(result)
         tensions = np.array(theirs["tensions"])

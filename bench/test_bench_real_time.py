@@ -42,7 +42,7 @@ def test_steps_in_real_time(model: str, most: int | None, tmp_path: Path, monkey
                 "ends.end={kind: pinned, position: [205, 0, 0]}", "output.every=100"]  # fmt: skip
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", settings)
     wall, thread, kernel = np.zeros(count), np.zeros(count), np.zeros(count)
-    steps, within = compiled.run_system, [0.0]
+    steps, within = compiled.run_network, [0.0]
 
     def timed(table: np.ndarray) -> int:
         begin = time.thread_time()
@@ -50,7 +50,7 @@ def test_steps_in_real_time(model: str, most: int | None, tmp_path: Path, monkey
         within[0] += time.thread_time() - begin
         return code
 
-    monkeypatch.setattr(compiled, "run_system", timed)
+    monkeypatch.setattr(compiled, "run_network", timed)
     with hybrid.Simulation(scene, tmp_path / "run.h5", most_iterations=most) as cable:
         for k in range(count):
             z, v = heave((k + 1) * STEP)

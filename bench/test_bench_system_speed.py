@@ -108,20 +108,20 @@ def of_moordyn(cells: int, step: float) -> tuple[Vector, float]:
     with tempfile.TemporaryDirectory() as folder, silence():
         path = Path(folder) / "deck.txt"
         path.write_text(deck(cells, step, "MoorDyn"))
-        system = moordyn.Create(str(path))
+        network = moordyn.Create(str(path))
         here = np.array(FAIRLEAD)
-        assert moordyn.Init(system, here.tolist(), [0.0] * 3) == 0
-        point, begin = moordyn.GetPoint(system, 4), clock.process_time()
+        assert moordyn.Init(network, here.tolist(), [0.0] * 3) == 0
+        point, begin = moordyn.GetPoint(network, 4), clock.process_time()
         pull = [np.linalg.norm(moordyn.GetPointForce(point))]
         couple = 10 * step  # s, in which the fairlead goes straight on: every 0.1 s it would be jerked by 1 kN
         for k in range(round(DURATION / couple)):
             now, then = heaved(couple * k), heaved(couple * (k + 1))
             at = [here[0], here[1], here[2] + now]
-            moordyn.Step(system, at, [0.0, 0.0, (then - now) / couple], couple * k, couple)
+            moordyn.Step(network, at, [0.0, 0.0, (then - now) / couple], couple * k, couple)
             if (k + 1) % round(0.1 / couple) == 0:
                 pull.append(np.linalg.norm(moordyn.GetPointForce(point)))
         cpu = clock.process_time() - begin
-        moordyn.Close(system)
+        moordyn.Close(network)
     return np.array(pull), cpu
 
 

@@ -1,4 +1,4 @@
-"""Fifty random systems: how many equilibria are found, and in which time; a thousand lines in one file.
+"""Fifty random networks: how many equilibria are found, and in which time; a thousand lines in one file.
 
 pytest bench/test_bench_systems.py -m bench -s
 """
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.bench
 
 
 class Drawing:
-    """A system that is drawn at random: 1 to 6 buoys, 0 to 2 submerged bodies, 2 to 14 lines; bed and current."""
+    """A network that is drawn at random: 1 to 6 buoys, 0 to 2 submerged bodies, 2 to 14 lines; bed and current."""
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)

@@ -57,7 +57,7 @@ LYING = {"a": "0 0 -30", "b": "20 0 -30"}
 
 
 @contextmanager
-def system(tmp_path: Path, **words: Any) -> Iterator[Any]:
+def network(tmp_path: Path, **words: Any) -> Iterator[Any]:
     """A running MoorDyn, at rest."""
     usual = {"ba": 0, "cd": 0, "ca": 0, "cdt": 0, "cat": 0, "a": "0 0 -50", "b": "0 0 -30", "hung": "0 0 0 0"}
     usual |= {"length": 20, "n": 20, "options": "100 WtrDpth"}
@@ -88,7 +88,7 @@ def pulls(made: Any) -> np.ndarray:
     [("", taken.GRAVITY, taken.DENSITY), ("10 g\n1000 rho", 10.0, 1000.0), ("10 gravity\n1000 WtrDnsty", 10.0, 1000.0)],
 )
 def test_gravity_and_density(options: str, gravity: float, density: float, tmp_path: Path) -> None:
-    with system(tmp_path, options=f"100 WtrDpth\n{options}", length=19.99) as (made, _):
+    with network(tmp_path, options=f"100 WtrDpth\n{options}", length=19.99) as (made, _):
         weight = -pulls(made).sum(axis=0)[2]
     assert weight == pytest.approx((20 - density * AREA) * gravity * 19.99, rel=1e-6)
 
@@ -100,14 +100,14 @@ def test_gravity_and_density(options: str, gravity: float, density: float, tmp_p
 def test_drag_is_on_the_diameter_and_along_on_the_circumference(
     cd: float, cdt: float, velocity: list[float], width: float, tmp_path: Path
 ) -> None:
-    with system(tmp_path, cd=cd, cdt=cdt, options="0 g\n100 WtrDpth") as (made, ends):
+    with network(tmp_path, cd=cd, cdt=cdt, options="0 g\n100 WtrDpth") as (made, ends):
         moved(made, ends, velocity)
         drag = np.array(moordyn.GetLineNodeDrag(moordyn.GetLine(made, 1), 0))
     assert np.linalg.norm(drag) == pytest.approx(0.5 * 1025 * width * HALF, rel=1e-4)
 
 
 def test_added_mass_is_on_the_displaced_mass(tmp_path: Path) -> None:
-    with system(tmp_path, ca=1.0, cat=0.5) as (made, _):
+    with network(tmp_path, ca=1.0, cat=0.5) as (made, _):
         mass = np.diag(moordyn.GetLineNodeM(moordyn.GetLine(made, 1), 5))
     assert mass - 20 == pytest.approx(1025 * AREA * np.array([1.0, 1.0, 0.5]), rel=1e-5)
 
@@ -115,7 +115,7 @@ def test_added_mass_is_on_the_displaced_mass(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("speed", "per"), [(0.0, 1000.0), (-1.0, 2000.0), (1.0, 0.0)])
 def test_the_bed_is_a_pressure_on_the_diameter_and_damps_both_ways(speed: float, per: float, tmp_path: Path) -> None:
     text = "0 g\n30 WtrDpth\n1e4 kBot\n1e3 cBot"
-    with system(tmp_path, **LYING, options=text) as (made, ends):
+    with network(tmp_path, **LYING, options=text) as (made, ends):
         moved(made, ends, [0, 0, speed] * 2, sink=0.1)
         force = moordyn.GetLineNodeSeabedForce(moordyn.GetLine(made, 1), 0)[2]
     assert force == pytest.approx(per * 0.1 * HALF, abs=0.02)
@@ -124,7 +124,7 @@ def test_the_bed_is_a_pressure_on_the_diameter_and_damps_both_ways(speed: float,
 def test_the_bed_without_options_is_under_the_lowest_point(tmp_path: Path) -> None:
     found = []
     for speed in (0.0, -1.0):
-        with system(tmp_path, **LYING, options="0 g") as (made, ends):
+        with network(tmp_path, **LYING, options="0 g") as (made, ends):
             moved(made, ends, [0, 0, speed] * 2, sink=0.1)
             found.append(moordyn.GetLineNodeSeabedForce(moordyn.GetLine(made, 1), 0)[2] / (0.1 * HALF))
     assert found[0] == pytest.approx(0.1 * taken.BED_STIFFNESS, rel=1e-4)
@@ -133,7 +133,7 @@ def test_the_bed_without_options_is_under_the_lowest_point(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(("ba", "tension"), [(1.0e6, 1.0e6), (-0.5, 0.5 * 20 * math.sqrt(1e8 * 20))])
 def test_ba_is_tension_per_rate_of_strain_or_a_part_of_critical(ba: float, tension: float, tmp_path: Path) -> None:
-    with system(tmp_path, ba=ba, n=1, options="0 g\n100 WtrDpth") as (made, ends):
+    with network(tmp_path, ba=ba, n=1, options="0 g\n100 WtrDpth") as (made, ends):
         moved(made, ends, [0, 0, 0, 0, 0, 1.0])
         pull = -pulls(made)[1, 2]
     stretched = 1e8 * 0.5e-5 / 20  # in the middle of the step, where RK2 takes its forces
@@ -144,7 +144,7 @@ def test_ba_is_tension_per_rate_of_strain_or_a_part_of_critical(ba: float, tensi
 def test_a_point_is_lifted_by_its_volume_above_the_surface_too(z: float, tmp_path: Path) -> None:
     found = []
     for hung in ("0 0 0 0", "100 1 0 0"):
-        with system(tmp_path, hung=hung, b=f"0 0 {z}", length=z + 50) as (made, _):
+        with network(tmp_path, hung=hung, b=f"0 0 {z}", length=z + 50) as (made, _):
             found.append(pulls(made)[1])
     assert found[1] - found[0] == pytest.approx([0, 0, taken.GRAVITY * (1025 - 100)], rel=1e-6)
 
@@ -152,13 +152,13 @@ def test_a_point_is_lifted_by_its_volume_above_the_surface_too(z: float, tmp_pat
 def test_a_body_turns_by_degrees_about_x_then_y_then_z(tmp_path: Path) -> None:
     from hybrid.interop.moordyn.cables import _rotated
 
-    with system(tmp_path) as (made, _):
+    with network(tmp_path) as (made, _):
         place = np.array(moordyn.GetPointPos(moordyn.GetPoint(made, 3))) - [0, 0, -10]
     assert place == pytest.approx(_rotated((30.0, 40.0, 50.0), (1.0, 2.0, 3.0)), abs=1e-9)
 
 
 def test_a_negative_length_is_times_the_distance(tmp_path: Path) -> None:
-    with system(tmp_path, length=-1.02) as (made, _):
+    with network(tmp_path, length=-1.02) as (made, _):
         assert moordyn.GetLineUnstretchedLength(moordyn.GetLine(made, 1)) == pytest.approx(20.4)
 
 

@@ -39,16 +39,16 @@ LINES = network_scene(
 
 # The longest first: who comes second to a kernel loads it, or waits.
 BY_TABLE = {
-    "solvers": """run.entry.in_space run.entry.in_plane run.network.solve_system run.network.begin_line
-        run.network_run.sample_system run.network.book_system_step""",
+    "solvers": """run.entry.in_space run.entry.in_plane run.network.solve_network run.network.begin_line
+        run.network_run.sample_network run.network.book_network_step""",
     "rest": """mesh.zone_step.advance_zones mesh.cell_changes.begin_switch mesh.cell_changes.end_switch
         mesh.zone_step.plan_nodes mesh.zone_step.read_arcs mesh.zone_transfer.transfer mesh.cell_changes.plan_cells
         mesh.cell_changes.clear_state mesh.cell_changes.renew mesh.remesh.put_cells mesh.remesh.begin_cells
         mesh.remesh.end_cells contact.self_contact.contact_task contact.self_distance.watch_itself
-        junctions.lines_contact.touch_system junctions.lines_contact.shared_task
+        junctions.lines_contact.touch_network junctions.lines_contact.shared_task
         junctions.sheaves_and_winches.wind_lines junctions.sheaves_and_winches.spin_sheaves junctions.junctions.twist_lines
         junctions.junctions.join_lines junctions.body_contact.meet_bodies
-        watch.named_quantities.note_quantities run.network_run.run_system""",
+        watch.named_quantities.note_quantities run.network_run.run_network""",
 }
 
 IN_TESTS = "run.network_tangents.advance_in_plane run.network_tangents.advance_joined"  # solvers, too

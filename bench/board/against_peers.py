@@ -120,13 +120,13 @@ def heaved_chains(name: str) -> list[Answer]:
 
 
 def moorings_at_rest(name: str) -> list[Answer]:
-    """Ten systems of hybrid on two meshes and of MoorPy, whose catenaries are the reference; CPU time of all ten."""
+    """Ten networks of hybrid on two meshes and of MoorPy, whose catenaries are the reference; CPU time of all ten."""
     if not spread_mooring.installed("moorpy"):
         return []
-    systems = [random_moorings.random_system(seed) for seed in range(random_moorings.COUNT)]
-    theirs, found = random_moorings.by_moorpy(systems), list[Answer]()
+    networks = [random_moorings.random_system(seed) for seed in range(random_moorings.COUNT)]
+    theirs, found = random_moorings.by_moorpy(networks), list[Answer]()
     for cells in (20, random_moorings.CELLS):
-        scenes = [random_moorings.scene_of(x, cells) for x in systems]
+        scenes = [random_moorings.scene_of(x, cells) for x in networks]
         results, cpu = timed(lambda scenes=scenes: [hybrid.static(x) for x in scenes])
         off = []
         for result, other in zip(results, theirs, strict=True):

@@ -69,19 +69,19 @@ def heaved(
         path = Path(folder) / "deck.txt"
         path.write_text(text)
         begin = time.process_time()
-        system = moordyn.Create(str(path))
+        network = moordyn.Create(str(path))
         try:
             place = [float(x) for x in row["start"]]
-            assert moordyn.Init(system, place, [0.0, 0.0, 0.0]) == 0
-            point, inner = moordyn.GetPoint(system, 2), round(EVERY / COUPLING)
+            assert moordyn.Init(network, place, [0.0, 0.0, 0.0]) == 0
+            point, inner = moordyn.GetPoint(network, 2), round(EVERY / COUPLING)
             force = [np.linalg.norm(moordyn.GetPointForce(point))]
             for k in range(round(heave["duration"] / COUPLING)):
                 now, then = (moved(t, heave)[0] for t in (k * COUPLING, (k + 1) * COUPLING))
                 at = [place[0], place[1], place[2] + now]
-                moordyn.Step(system, at, [0.0, 0.0, (then - now) / COUPLING], k * COUPLING, COUPLING)
+                moordyn.Step(network, at, [0.0, 0.0, (then - now) / COUPLING], k * COUPLING, COUPLING)
                 if not (k + 1) % inner:
                     force.append(np.linalg.norm(moordyn.GetPointForce(point)))
         finally:
-            moordyn.Close(system)
+            moordyn.Close(network)
         spent = time.process_time() - begin
     return np.arange(len(force)) * EVERY, np.array(force), spent

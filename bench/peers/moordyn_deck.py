@@ -56,28 +56,28 @@ def march(text: str, motion: Motion, duration: float, every: float, hand: float,
         path.write_text(text)
         for file in beside:
             shutil.copy(file, folder)
-        system = moordyn.Create(str(path))
+        network = moordyn.Create(str(path))
         try:
             here = motion(0.0)
-            assert moordyn.Init(system, here.tolist(), [0.0] * here.size) == 0
-            points = range(1, moordyn.GetNumberPoints(system) + 1)
+            assert moordyn.Init(network, here.tolist(), [0.0] * here.size) == 0
+            points = range(1, moordyn.GetNumberPoints(network) + 1)
 
             def look() -> list[Vector]:
-                return [np.array(moordyn.GetPointForce(moordyn.GetPoint(system, k))) for k in points]
+                return [np.array(moordyn.GetPointForce(moordyn.GetPoint(network, k))) for k in points]
 
             looks, n = [look()], round(every / hand)
             for k in range(round(duration / every)):
                 for i in range(n):
                     t = k * every + i * every / n
                     now, then = motion(t), motion(t + every / n)
-                    moordyn.Step(system, now.tolist(), ((then - now) * n / every).tolist(), t, every / n)
+                    moordyn.Step(network, now.tolist(), ((then - now) * n / every).tolist(), t, every / n)
                 looks.append(look())
             nodes = {}
-            for id in range(1, moordyn.GetNumberLines(system) + 1):
-                line = moordyn.GetLine(system, id)
+            for id in range(1, moordyn.GetNumberLines(network) + 1):
+                line = moordyn.GetLine(network, id)
                 count = moordyn.GetLineNumberNodes(line)
                 nodes[id] = np.array([moordyn.GetLineNodePos(line, i) for i in range(count)])
         finally:
-            moordyn.Close(system)
+            moordyn.Close(network)
     forces = np.array(looks)
     return Seen(np.arange(len(looks)) * every, {k: forces[:, k - 1] for k in points}, nodes)

@@ -127,21 +127,21 @@ def run(
         path = Path(folder) / "touchdown.dat"
         path.write_text(deck(elements, EI, dt, scheme, damping, relaxation, options))
         begin = time.process_time()
-        system = moordyn.Create(str(path))
+        network = moordyn.Create(str(path))
         try:
-            if moordyn.Init(system, [x, 0.0, heights[0]], [0.0, 0.0, 0.0]):
+            if moordyn.Init(network, [x, 0.0, heights[0]], [0.0, 0.0, 0.0]):
                 raise RuntimeError("MoorDyn does not start")
-            tension[0] = math.hypot(*moordyn.GetPointForce(moordyn.GetPoint(system, 2)))
+            tension[0] = math.hypot(*moordyn.GetPointForce(moordyn.GetPoint(network, 2)))
             cpu_start = time.process_time() - begin
 
             begin = time.process_time()
             for k in range(steps):
-                force = moordyn.Step(system, (x, 0.0, heights[k]), (0.0, 0.0, rates[k]), k * couple, couple)
+                force = moordyn.Step(network, (x, 0.0, heights[k]), (0.0, 0.0, rates[k]), k * couple, couple)
                 if not (k + 1) % every:
                     tension[(k + 1) // every] = math.hypot(*force)
             cpu = time.process_time() - begin
         finally:
-            moordyn.Close(system)
+            moordyn.Close(network)
     settings = f"{scheme}, dt {dt:g} s, BA {damping:g}, motion every {couple:g} s"
     times = np.linspace(0.0, couple * every * (tension.size - 1), tension.size)
     return Answer(times, tension, cpu, cpu_start, settings)

@@ -1,6 +1,6 @@
-"""Equilibria of systems of lines by MoorPy: systems as JSON on the input, end tensions and places and CPU times on the output.
+"""Equilibria of networks of lines by MoorPy: networks as JSON on the input, end tensions and places and CPU times on the output.
 
-Run by a Python that has MoorPy; it shares nothing with hybrid but the numbers of the systems.
+Run by a Python that has MoorPy; it shares nothing with hybrid but the numbers of the networks.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ DENSITY, GRAVITY, DEPTH = 1025.0, 9.80665, 100.0
 
 
 def equilibrium(given: dict[str, Any]) -> dict[str, Any]:
-    """The equilibrium of one system: a free point or a free body on lines from anchors on the seabed."""
+    """The equilibrium of one network: a free point or a free body on lines from anchors on the seabed."""
     begin = time.process_time()
-    system = moorpy.System(depth=DEPTH, rho=DENSITY, g=GRAVITY)
+    network = moorpy.System(depth=DEPTH, rho=DENSITY, g=GRAVITY)
     what, body = given["float"], None
     if what["kind"] == "body":
-        body = system.addBody(0, np.array([*what["guess"], 0.0, 0.0, 0.0]), m=what["mass"], v=what["volume"],
+        body = network.addBody(0, np.array([*what["guess"], 0.0, 0.0, 0.0]), m=what["mass"], v=what["volume"],
                               rCG=np.array(what["centre"]), rM=np.array(what["buoyancy"]))  # fmt: skip
     else:
-        system.addPoint(0, what["guess"], m=what["mass"], v=what["volume"])
+        network.addPoint(0, what["guess"], m=what["mass"], v=what["volume"])
     for number, line in enumerate(given["lines"]):
         area = 0.25 * np.pi * line["diameter"] ** 2
-        system.lineTypes[f"t{number}"] = {
+        network.lineTypes[f"t{number}"] = {
             "name": f"t{number}", "material": "line", "d_vol": line["diameter"], "m": line["mass"], "EA": line["EA"],
             "w": (line["mass"] - DENSITY * area) * GRAVITY,
         }  # fmt: skip
-        system.addPoint(1, line["anchor"])
-        anchor = len(system.pointList)
+        network.addPoint(1, line["anchor"])
+        anchor = len(network.pointList)
         end = 1
         if body is not None:
-            system.addPoint(1, [0.0, 0.0, 0.0])
-            end = len(system.pointList)
+            network.addPoint(1, [0.0, 0.0, 0.0])
+            end = len(network.pointList)
             body.attachPoint(end, line["fairlead"])
-        system.addLine(line["length"], f"t{number}", pointA=anchor, pointB=end)
-    system.initialize()
-    if not system.solveEquilibrium(DOFtype="free", tol=1e-5, maxIter=5000):
+        network.addLine(line["length"], f"t{number}", pointA=anchor, pointB=end)
+    network.initialize()
+    if not network.solveEquilibrium(DOFtype="free", tol=1e-5, maxIter=5000):
         raise SystemExit("MoorPy found no equilibrium")
-    place = body.r6 if body is not None else system.pointList[0].r
+    place = body.r6 if body is not None else network.pointList[0].r
     spent = time.process_time() - begin
-    tensions = [[float(x.TA), float(x.TB)] for x in system.lineList]
+    tensions = [[float(x.TA), float(x.TB)] for x in network.lineList]
     return {"place": list(map(float, place)), "tensions": tensions, "cpu": spent}
 
 

@@ -1,4 +1,4 @@
-"""Ten random systems of chains at rest, in hybrid and in MoorPy: quasi-static elastic catenaries on a bed without friction."""
+"""Ten random networks of chains at rest, in hybrid and in MoorPy: quasi-static elastic catenaries on a bed without friction."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def random_system(seed: int) -> dict[str, Any]:
 
 
 def scene_of(given: dict[str, Any], cells: int = CELLS) -> dict[str, Any]:
-    """The same system as a scene."""
+    """The same network as a scene."""
     what, points, lines = given["float"], {}, {}
     for k, line in enumerate(given["lines"]):
         points[f"anchor{k}"] = {"position": line["anchor"]}
@@ -72,9 +72,9 @@ def scene_of(given: dict[str, Any], cells: int = CELLS) -> dict[str, Any]:
     return scene
 
 
-def by_moorpy(systems: list[dict[str, Any]], python: str = sys.executable) -> list[dict[str, Any]]:
-    """Of each system: end tensions (start and end of each line, N), place (m, rad) of its float, CPU time (s)."""
-    done = subprocess.run([python, PEER], input=json.dumps(systems), capture_output=True, text=True, check=True)
+def by_moorpy(networks: list[dict[str, Any]], python: str = sys.executable) -> list[dict[str, Any]]:
+    """Of each network: end tensions (start and end of each line, N), place (m, rad) of its float, CPU time (s)."""
+    done = subprocess.run([python, PEER], input=json.dumps(networks), capture_output=True, text=True, check=True)
     return list(json.loads(done.stdout))
 
 

@@ -198,21 +198,21 @@ def moordyns(count: int, step: float) -> tuple[Vector, float]:
         path = Path(folder) / "deck.txt"
         path.write_text(text)
         begin = time.process_time()
-        system = moordyn.Create(str(path))
+        network = moordyn.Create(str(path))
         rest, velocity = np.array([around(count, FAIRLEADS, k) for k in range(count)]), np.zeros((count, 3))
-        assert moordyn.Init(system, rest.ravel().tolist(), velocity.ravel().tolist()) == 0
-        point = moordyn.GetPoint(system, 2)
+        assert moordyn.Init(network, rest.ravel().tolist(), velocity.ravel().tolist()) == 0
+        point = moordyn.GetPoint(network, 2)
         pull = [float(np.linalg.norm(moordyn.GetPointForce(point)))]
         for k in range(round(DURATION / COUPLING)):
             now, then = heaved(COUPLING * k), heaved(COUPLING * (k + 1))
             position = rest.copy()
             position[:, 2] += now
             velocity[:, 2] = (then - now) / COUPLING
-            moordyn.Step(system, position.ravel().tolist(), velocity.ravel().tolist(), COUPLING * k, COUPLING)
+            moordyn.Step(network, position.ravel().tolist(), velocity.ravel().tolist(), COUPLING * k, COUPLING)
             if (k + 1) % round(EVERY / COUPLING) == 0:
                 pull.append(float(np.linalg.norm(moordyn.GetPointForce(point))))
         spent = time.process_time() - begin
-        moordyn.Close(system)
+        moordyn.Close(network)
     return np.array(pull), spent
 
 

@@ -202,9 +202,11 @@ LARGEST = "largest"
 # Kinds of the event that says so: of waves, and of a line that snaps.
 IRREGULAR, SNAPS = "irregular motion", "snaps"
 STATISTICS = {
-    LARGEST: "largest value", "deviation": "standard deviation", "windows_largest": "mean of the windows' largest",
+    LARGEST: "largest value",
+    "deviation": "standard deviation",
+    "windows_largest": "mean of the windows' largest",
     "windows_smallest": "mean of the windows' smallest",
-}  # fmt: skip
+}
 # Steps from slack to the mean force from which on a run shows a snap.
 STEPS_IN_RISE = 3
 # Windows from which on their scatter is known.

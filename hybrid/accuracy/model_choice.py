@@ -26,7 +26,7 @@ from hybrid.accuracy.error_order import magnitude
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.model.build import Model
 from hybrid.model.mesh import GROWTH, Grading
-from hybrid.model.network import NetworkResolution, build_system
+from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import payout_of
 from hybrid.model.plan import (
     REST,
@@ -135,7 +135,7 @@ def as_rods(
 
     resolution: of a run of the network; runs: of the lines that change in it; points: where outputs of lines are.
     """
-    model, tables, finely = build_system(network, resolution=resolution), {}, dict(resolution.lines)
+    model, tables, finely = build_network(network, resolution=resolution), {}, dict(resolution.lines)
     ends: dict[str, list[_EndCell]] = {}
     for name, run in runs.items():
         line, s = model.models[model.names.index(name)], points[name].s

@@ -109,9 +109,11 @@ UNITS = {
     "end_force_start": "N", "end_force_end": "N",
 }  # fmt: skip
 CAUSES = {
-    "mesh": "error by the mesh", "time": "error by the time step", "model": "error by neglected bending",
+    "mesh": "error by the mesh",
+    "time": "error by the time step",
+    "model": "error by neglected bending",
     "total": "error by all causes",
-}  # fmt: skip
+}
 
 
 Attributes = Mapping[str, str | float | int]
@@ -206,9 +208,11 @@ def effort(scene: LineScene, control: LineErrors, result: RunSample, cpu: float)
     """What was spent on a result, and what was asked, as its attributes; cpu: s, of all passes."""
     resolution = result.resolution
     attributes: dict[str, str | float | int] = {
-        "effort_fineness": resolution.fineness, "effort_runs": len(control.runs),
-        "effort_cpu": cpu, "effort_step": resolution.step,
-    }  # fmt: skip
+        "effort_fineness": resolution.fineness,
+        "effort_runs": len(control.runs),
+        "effort_cpu": cpu,
+        "effort_step": resolution.step,
+    }
     if resolution.local is not None:
         attributes["effort_step_error"] = resolution.local
     if isinstance(scene.model, AdaptiveModel):
@@ -257,7 +261,8 @@ def error_fields(result: RunSample, errors: Errors) -> list[Field]:
     """Errors by cause and quantity."""
     return [
         Field(
-            f"errors/{cause}/{name}", UNITS[name],
+            f"errors/{cause}/{name}",
+            UNITS[name],
             f"{CAUSES[cause]} of {name.removeprefix('right_').replace('_', ' ')}"
             f"{' just after the point' * name.startswith('right_')}, estimated",
             (result.places[-1] + 1,) if result.places.size and is_along(name) else shape[1:],
@@ -265,7 +270,7 @@ def error_fields(result: RunSample, errors: Errors) -> list[Field]:
         )
         for cause, quantities in errors.fields.items()
         for name, shape in quantities.items()
-    ]  # fmt: skip
+    ]
 
 
 class Passes:

@@ -144,9 +144,10 @@ def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[Bound]:
             size = max(asked.of_end_force * run.largest_end_force, asked.round_off("N", step))
             bounds.append(Bound(name, "N", size, run.largest_end_force))
     for name, unit, part in (
-        ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
+        ("curvature", "1/m", asked.of_curvature),
+        ("bending_moment", "N m", asked.of_moment),
         ("tension", "N", asked.of_tension),
-    ):  # fmt: skip
+    ):
         if part is not None and name in run.values:
             largest = run.largest(name)
             bounds.append(Bound(name, unit, max(part * largest, asked.round_off(unit, step)), largest))

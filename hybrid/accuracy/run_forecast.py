@@ -282,10 +282,10 @@ def _of_passes(
     return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
 
 
-def _grown(system: Network) -> float:
-    """When all loads and motions of a system that grow from nothing have grown, s."""
-    moved = [getattr(x, "motion", None) for x in (*system.points.values(), *system.bodies.values())]
-    return max((getattr(x, "ramp", None) or 0.0 for x in (system.environment.waves, *moved)), default=0.0)
+def _grown(network: Network) -> float:
+    """When all loads and motions of a network that grow from nothing have grown, s."""
+    moved = [getattr(x, "motion", None) for x in (*network.points.values(), *network.bodies.values())]
+    return max((getattr(x, "ramp", None) or 0.0 for x in (network.environment.waves, *moved)), default=0.0)
 
 
 # How much all results for an accuracy may take: some times what the first result foretells of them.

@@ -77,8 +77,10 @@ def resume(
     start: Annotated[
         float | None, typer.Option("--from", metavar="T", help=".. from then on (s); else from where it is.")
     ] = None,
-    plot: Drawn = False, quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    plot: Drawn = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Go on with a run that was stopped, beyond its end, or with other loads."""
     with session(as_json, quiet) as console:
         from hybrid.simulation.restart import remaining
@@ -129,13 +131,14 @@ def static(
 
 @app.command()
 def plan(
-    scene: SceneFile, settings: Settings = None,
+    scene: SceneFile,
+    settings: Settings = None,
     verbose: Annotated[bool, flag("--verbose", "-v", help="All that is on and off, and why.")] = False,
     outputs: Annotated[
         bool, flag("--outputs", help="Instead: what the result will hold, and what it may, with units.")
     ] = False,
     as_json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Show what a run would compute, by which keys of the scene, and how long it takes: first steps are computed."""
     with session(as_json, False) as console:
         from hybrid.cli.plan_tables import contents_tables, outputs_table, plan_facts, plan_rows
@@ -156,16 +159,15 @@ def plan(
 
 @app.command()
 def trade(
-    context: typer.Context, scene: SceneFile,
+    context: typer.Context,
+    scene: SceneFile,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Else SCENE.trade, in this folder.")
     ] = None,
     models: Annotated[
         Any, typer.Option(metavar="KIND,..", parser=words, help="Else all that the scene admits.")
     ] = None,
-    accuracies: Annotated[
-        Any, typer.Option(metavar="A,A,..", parser=words, help="Else 10%,3%,1%,0.3%,0.1%.")
-    ] = None,
+    accuracies: Annotated[Any, typer.Option(metavar="A,A,..", parser=words, help="Else 10%,3%,1%,0.3%,0.1%.")] = None,
     reference: Annotated[
         str | None, typer.Option(metavar="A", help="Of the rod to compare with; else 0.03% or finer.")
     ] = None,
@@ -175,8 +177,10 @@ def trade(
     levels: Annotated[
         bool, flag("--levels", help="Instead: what position and tension, moments, curvature cost with every model.")
     ] = False,
-    settings: Settings = None, quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    settings: Settings = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Compare models and accuracies on a scene: error against CPU time; recommend one."""
     if peers:
         from hybrid.studies.tradeoff import PEERS_ARE
@@ -231,8 +235,9 @@ def import_(
     line: Annotated[int | None, typer.Option(metavar="ID", help="Only the cable with this line.")] = None,
     separate: Annotated[bool, flag("--separate", help="Each cable as a scene of its own.")] = False,
     overwrite: Annotated[bool, flag("--overwrite", help="Replace scenes that are there.")] = False,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Make a scene of a MoorDyn deck, or one for each cable, and say what could not be carried over."""
     with session(as_json, quiet) as console:
         from hybrid.cli.tables import import_notes

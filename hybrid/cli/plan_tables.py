@@ -98,15 +98,15 @@ def _rows_of_line(scene: Scene, plan: Plan, on: Mapping[str, str]) -> dict[str, 
     }
 
 
-def _rows_of_lines(system: Any, each: Mapping[str, Plan]) -> dict[str, str]:
+def _rows_of_lines(network: Any, each: Mapping[str, Plan]) -> dict[str, str]:
     """A row for each line, with its ends, of many one for all that are alike, with their names; points and bodies."""
     rows: dict[str, str] = {}
     alike: dict[str, list[str]] = {}
     for name, line in each.items():
-        joined = system.lines[name]
+        joined = network.lines[name]
         length = sum(section.length for section in joined.sections)
         what = f"{_model(line)}, {counted(sum(line.cells), 'cell')}"
-        what += "".join(f"; {text}" for text in _clamps(system, name))
+        what += "".join(f"; {text}" for text in _clamps(network, name))
         if len(each) > MOST_LISTED:
             alike.setdefault(f"{length:.6g} m, {what} each", []).append(name)
         else:
@@ -119,8 +119,8 @@ def _rows_of_lines(system: Any, each: Mapping[str, Plan]) -> dict[str, str]:
         while key in groups:
             key += " "  # another row of the same name
         groups[key] = f"{what}: {', '.join(names)}" if len(names) > 1 else f"{what.removesuffix(' each')}: {names[0]}"
-    bodies = ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items())
-    return groups | rows | {"free points": ", ".join(system.free) or "none", "bodies": bodies}
+    bodies = ", ".join(f"{name} ({body.kind})" for name, body in network.bodies.items())
+    return groups | rows | {"free points": ", ".join(network.free) or "none", "bodies": bodies}
 
 
 def _noted(plan: Plan, kind: str) -> str:
@@ -148,25 +148,27 @@ def _contact(on: Mapping[str, str]) -> str:
     return f"of the line with itself, {why}" if why.startswith(WHERE_NEAR) else ""
 
 
-def _of_lines(system: Any, on: Mapping[str, str]) -> str:
+def _of_lines(network: Any, on: Mapping[str, str]) -> str:
     """Which lines touch each other, and what else they touch."""
-    pairs, found = [f"{a} with {b}" for a, b in system.meeting_pairs], []
+    pairs, found = [f"{a} with {b}" for a, b in network.meeting_pairs], []
     if pairs:
         named = ", ".join(pairs[:MOST_PAIRS]) + (
             f" and {len(pairs) - MOST_PAIRS} more" if len(pairs) > MOST_PAIRS else ""
         )
         rubs = (
-            f", friction {system.contact.friction:g}" if system.contact is not None and system.contact.friction else ""
+            f", friction {network.contact.friction:g}"
+            if network.contact is not None and network.contact.friction
+            else ""
         )
         found.append(f"of lines with each other{rubs}: {named}")
     elif OTHERS in on:
         found.append(f"of lines with each other, {on[OTHERS]}")
-    elif system.contact is not None and system.contact.between is None:
+    elif network.contact is not None and network.contact.between is None:
         found.append("lines cannot reach each other")
-    elif len(system.lines) > 1:
+    elif len(network.lines) > 1:
         found.append("lines pass through each other, and an event says where: contact: {} keeps them apart")
-    shapes = [name for name, body in system.free_bodies.items() if body.shape is not None]
-    for what, names in (("obstacles", [*system.obstacles]), ("bodies", shapes)):
+    shapes = [name for name, body in network.free_bodies.items() if body.shape is not None]
+    for what, names in (("obstacles", [*network.obstacles]), ("bodies", shapes)):
         found += [f"of every line with {what} {', '.join(names)}"] if names else []
     return "; ".join(found)
 
@@ -184,11 +186,11 @@ def _outputs(scene: Scene) -> str:
     return f"{count}, every {every:.4g} s, in a file of some {large}{few * (every * PER_PERIOD > 1.01 * period)}"
 
 
-def _clamps(system: Network, name: str) -> list[str]:
+def _clamps(network: Network, name: str) -> list[str]:
     """How the ends of a line are clamped, those that are."""
     found = []
     for end in ("start", "end"):
-        held = system.clamp(name, end)
+        held = network.clamp(name, end)
         if held is not None:
             spring = "" if held.bend_stiffness is None else f" by {held.bend_stiffness:g} N m/rad"
             found.append(f"{end} clamped{spring}{', free to spin' if held.swivel else ''}")

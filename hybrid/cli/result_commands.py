@@ -170,8 +170,9 @@ def export(
     moordyn: Annotated[bool, flag("--moordyn", help="The scene of the result as a MoorDyn deck, RUN.txt.")] = False,
     settings: Settings = None,
     keep: Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Write a result for xarray, spreadsheets, ParaView, fatigue; its scene for MoorDyn; or a scene as an FMU."""
     if moordyn:
         given = {"--format": format, "--at": at, "--names": names, "--times": times, "--line": line, "--set": settings}

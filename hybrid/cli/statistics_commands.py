@@ -42,12 +42,14 @@ LEAST = 1e-6  # of the largest: smaller motions are those of round-off
 
 @app.command()
 def response(
-    scene: SceneFile, settings: Settings = None,
+    scene: SceneFile,
+    settings: Settings = None,
     hours: Annotated[float, typer.Option(metavar="H", help="Largest values of so many hours.")] = 3.0,
     smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
     check: Annotated[float | None, typer.Option(metavar="S", help="Compare with a run in time of so many s.")] = None,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Standard deviations and largest values in the waves of a scene, by frequency, without a run in time."""
     if not 0.0 < hours < np.inf:
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
@@ -143,15 +145,17 @@ LEAST_SHARE = 0.05  # of the energy, the least part that is shown
 
 @app.command()
 def modes(
-    scene: SceneFile, settings: Settings = None,
+    scene: SceneFile,
+    settings: Settings = None,
     count: Annotated[int, typer.Option("--count", metavar="N", help="How many, the longest periods first.")] = 10,
     near: Annotated[float | None, typer.Option(metavar="S", help="Those nearest to this period (s) instead.")] = None,
     smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the shapes: PNG, PDF, SVG; HTML, where they swing.")
     ] = None,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Natural periods and shapes of a cable, or of lines with their points and bodies, about the equilibrium."""
     with session(as_json, quiet) as console:
         from hybrid.view.figure import PAGES, PICTURES, check_target

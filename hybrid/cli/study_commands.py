@@ -45,8 +45,9 @@ def design(
     source: Annotated[Path, typer.Argument(metavar="DESIGN.yaml", help="The design file.", show_default=False)],
     output: Annotated[Path | None, output_option("Write the scene with the numbers found.")] = None,
     plot: Annotated[Path | None, plot_option("before and after")] = None,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Find numbers of a scene for which its equilibrium is what is asked: within limits, least of something."""
     with session(as_json, quiet) as console:
         from hybrid.designs.design import Identified
@@ -175,8 +176,9 @@ def seek(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the scene with the numbers found.")
     ] = None,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Find numbers of a scene with which results of its equilibrium are what is asked."""
     targets = {}
     for each in target:
@@ -211,7 +213,8 @@ def _design_table(found: Sought) -> Any:
 
 @app.command()
 def sensitivity(
-    scene: SceneFile, settings: Settings = None,
+    scene: SceneFile,
+    settings: Settings = None,
     of: Annotated[
         list[Any] | None,
         typer.Option("--of", metavar="RESULT,..", parser=words, help="Results such as tension@0, max curvature."),
@@ -223,8 +226,9 @@ def sensitivity(
     motion: Annotated[
         bool, flag("--motion", help="Of a run, in steps that stay: of 'max tension@end', 'std position.z@100'.")
     ] = False,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Derivatives and elasticities (% by %) of an equilibrium, or a motion, by the numbers of its scene."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
@@ -312,8 +316,9 @@ def study(
         bool, flag("--derivatives", help="With --sensitivity: shares of the spread by derivatives at the mean.")
     ] = False,
     overwrite: Annotated[bool, flag("--overwrite", help="Begin anew where there is a study.")] = False,
-    quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Compute a scene with other values of its keys, many times; a second call does what is missing."""
     if source.is_dir() and case is None and sensitivity is None:
         raise UsageError(
@@ -422,9 +427,10 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
 
 
 HEADS = {
-    "sobol": ("first order", "total", "± (95 %)"), "morris": ("mean effect", "standard deviation", "± (95 %)"),
+    "sobol": ("first order", "total", "± (95 %)"),
+    "morris": ("mean effect", "standard deviation", "± (95 %)"),
     "rank": ("rank correlation", "", "by chance"),
-}  # fmt: skip
+}
 
 
 def _influences(rows: list[Any]) -> Any:

@@ -86,10 +86,11 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
     """The same in words; moves: whether there are times."""
     limits = {x["limit"]: x for x in facts["limits"]}
     rows = (
-        ("largest tension", "tension_max", "N", "max_tension"), ("smallest tension", "tension_min", "N", "min_tension"),
+        ("largest tension", "tension_max", "N", "max_tension"),
+        ("smallest tension", "tension_min", "N", "min_tension"),
         ("smallest bend radius", "bend_radius_min", "m", "min_bend_radius"),
         ("largest contact force", "contact_max", "N/m", "max_contact_force"),
-    )  # fmt: skip
+    )
     for title, key, unit, limit in rows:
         x, held = facts.get(key), limits.get(limit)
         if x is None:

@@ -65,7 +65,7 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.lines_contact import strand_in
-from hybrid.simulation.run import Run, static_system
+from hybrid.simulation.run import Run, static_network
 from hybrid.solve.contact import TouchingLine
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -151,15 +151,15 @@ class BodiesAtRest:
         return sparse.csc_array(in_last(size, blocks))
 
 
-def with_bodies(model: NetworkModel, system: Network) -> NetworkModel:
+def with_bodies(model: NetworkModel, network: Network) -> NetworkModel:
     """The model with the bodies of a changed scene, and moments on its points; its lines stay as they are."""
-    free = system.free_bodies
-    held = [[system.points[x] for x in (line.start, line.end)] for line in system.lines.values()]
+    free = network.free_bodies
+    held = [[network.points[x] for x in (line.start, line.end)] for line in network.lines.values()]
     places = [
         [x.place if isinstance(x, Fairlead) and x.body in free else (0.0, 0.0, 0.0) for x in pair] for pair in held
     ]
-    moments = tuple(loads_of(system.moments_on(x)) for x in system.rigid)
-    return replace(model, bodies=bodies_of(system), fairleads=np.array(places), moments=moments)
+    moments = tuple(loads_of(network.moments_on(x)) for x in network.rigid)
+    return replace(model, bodies=bodies_of(network), fairleads=np.array(places), moments=moments)
 
 
 # Part of their diameters by which lines are thicker, and thinner, to tell whether they have only begun to touch.
@@ -458,10 +458,10 @@ class NetworkAtRest:
             out[..., k] = every[..., place]
         return out
 
-    def _scene_of(self, system: Network, name: str) -> LineScene:
+    def _scene_of(self, network: Network, name: str) -> LineScene:
         """A line with the free points that it carries, and others where they are first, and its named quantities."""
-        scene = system.scene_of(name, system.carried(name), system.guesses)
-        own = {key: q for key, q in system.output.quantities.items() if q.line in (name, None) and q.other is None}
+        scene = network.scene_of(name, network.carried(name), network.guesses)
+        own = {key: q for key, q in network.output.quantities.items() if q.line in (name, None) and q.other is None}
         if not own:
             return scene
         alone = {key: q.model_copy(update={"line": None}) for key, q in own.items()}
@@ -497,38 +497,38 @@ class NetworkAtRest:
             found.append(changed)
         return found[0], found[1]
 
-    def _hangs_on(self, system: Network, name: str) -> bool:
+    def _hangs_on(self, network: Network, name: str) -> bool:
         """Whether a line hangs on what a changed scene has changed."""
-        if any(getattr(system, x) is not getattr(self.scene, x) for x in OF_ALL):
+        if any(getattr(network, x) is not getattr(self.scene, x) for x in OF_ALL):
             return True
-        line = system.lines[name]
+        line = network.lines[name]
         if line is not self.scene.lines[name]:
             return True
-        changed = {body for body, x in system.bodies.items() if _moves_lines(x, self.scene.bodies[body])}
-        if any(getattr(system.bodies[x], "shape", None) is not None for x in changed):
+        changed = {body for body, x in network.bodies.items() if _moves_lines(x, self.scene.bodies[body])}
+        if any(getattr(network.bodies[x], "shape", None) is not None for x in changed):
             return True  # it is a surface for all lines
         for point in (line.start, line.end):
-            at = system.points[point]
+            at = network.points[point]
             if at is not self.scene.points[point] or (isinstance(at, Fairlead) and at.body in changed):
                 return True
         return False
 
-    def _changed(self, system: Network, key: str) -> _Changed:
+    def _changed(self, network: Network, key: str) -> _Changed:
         """A changed scene.  How a clamped line is seated may hang on first shapes: then such lines are built anew."""
-        anew = [self._hangs_on(system, name) for name in self._names]
+        anew = [self._hangs_on(network, name) for name in self._names]
         built = None
-        if self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
-            built = with_bodies(self._model, system)
+        if self._bodies.count and any(getattr(network, x) is not getattr(self.scene, x) for x in OF_BODIES):
+            built = with_bodies(self._model, network)
         bodies = (self._model if built is None else built).bodies
         clamped = [x for l, (x, new) in enumerate(zip(self._names, anew, strict=True)) if new and self._bodies.turns(l)]
-        by_shape = not all(seats_know_no_shape(system, x) for x in clamped)
-        shaped = shaped_anew(system, clamped, bodies, self._resolution) if by_shape else {}
+        by_shape = not all(seats_know_no_shape(network, x) for x in clamped)
+        shaped = shaped_anew(network, clamped, bodies, self._resolution) if by_shape else {}
         out = []
         for l, (name, line) in enumerate(zip(self._names, self.lines, strict=True)):
             if not anew[l]:
                 out.append(line.here)
                 continue
-            scene, first = self._scene_of(system, name), self._scenes[name]
+            scene, first = self._scene_of(network, name), self._scenes[name]
             seats: Floats | None = None
             if not self._bodies.turns(l):
                 model = nearby(line.model, first, scene, self._resolution.lines[name], LEFT_OUT)
@@ -536,13 +536,13 @@ class NetworkAtRest:
                 model, seats = shaped[name]
                 model = model if same_nodes(model.line.s, line.model.line.s) else None
             else:
-                clamped_anew = nearby_clamped(line.model, first, system, name, bodies, self._resolution, LEFT_OUT)
+                clamped_anew = nearby_clamped(line.model, first, network, name, bodies, self._resolution, LEFT_OUT)
                 model, seats = clamped_anew or (None, None)
             if model is None:
                 raise _other_cells(key)
             out.append(line.beside(scene, model, NO_FRAMES if seats is None else self._bodies.frames(l, seats)))
-        if system.surfaces:
-            out = self._on_surfaces(system, out, (self._model if built is None else built).bodies)
+        if network.surfaces:
+            out = self._on_surfaces(network, out, (self._model if built is None else built).bodies)
         if built is None and all(x is line.here for x, line in zip(out, self.lines, strict=True)):
             return _Changed(out, *self._here)
         whole = self._model if built is None else built
@@ -551,9 +551,9 @@ class NetworkAtRest:
         except ValueError:
             raise _other_cells(key) from None
 
-    def _on_surfaces(self, system: Network, lines: Sequence[Beside], bodies: Sequence[BodyModel]) -> list[Beside]:
+    def _on_surfaces(self, network: Network, lines: Sequence[Beside], bodies: Sequence[BodyModel]) -> list[Beside]:
         """Lines of a changed scene on obstacles as hard as all of it asks for, with bodies that carry some at rest."""
-        models = with_surfaces(system, [x.model for x in lines], bodies)
+        models = with_surfaces(network, [x.model for x in lines], bodies)
         out = [x._replace(model=model, sea=model.sea.at_time(np.inf)) for x, model in zip(lines, models, strict=True)]
         self._bodies.pressed(out)
         return [
@@ -574,7 +574,7 @@ def at_rest(asked: Scene, of: Sequence[str], cells: float = 1.0, places: Places 
     finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
     resolution = replace(resolution, lines=finely)
     with scene.form.in_words():
-        run = static_system(scene, None, lambda: scene_text(scene), resolution=resolution)
+        run = static_network(scene, None, lambda: scene_text(scene), resolution=resolution)
     return NetworkAtRest(scene, resolution, run, wanted)
 
 

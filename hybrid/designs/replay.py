@@ -15,7 +15,7 @@ from hybrid.errors import PUSHED, ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of
 from hybrid.model.contents import passing_each_other
-from hybrid.model.network import NetworkResolution, build_system
+from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.resolution import Resolution, accuracy_of
 from hybrid.model.sections import NEAR
 from hybrid.scene.network import Network
@@ -73,7 +73,7 @@ def course_of(scene: Any) -> Course:
     if not _is_open(scene):
         first = NetworkResolution.first(scene)
         course = Course(scene, first.lines)
-        flat = build_system(course.as_asked().network(scene), first).models
+        flat = build_network(course.as_asked().network(scene), first).models
         if scene.dimension is None and any(x.plane is not None for x in flat):
             refuse_push(run(scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})))
         return _with_nodes(course)
@@ -133,7 +133,7 @@ def with_outputs(
     if each_step:
         output["every"] = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
     if more is not None:
-        built = build_system(network, NetworkResolution(course.resolutions(finer)))
+        built = build_network(network, NetworkResolution(course.resolutions(finer)))
         each = zip(built.names, built.models, strict=True)
         output["points"] = {name: at_nodes(model.line.s, more.get(name, ())) for name, model in each}
     return network.model_copy(update={"output": network.output.model_copy(update=output)})
@@ -148,7 +148,7 @@ def at_nodes(nodes: Floats, more: Sequence[float]) -> tuple[float, ...]:
 def _with_nodes(course: Course) -> Course:
     """With the places of the nodes of every line."""
     network = course.network(course.scene)
-    model = build_system(network, NetworkResolution(course.lines))
+    model = build_network(network, NetworkResolution(course.lines))
     scenes = network.scenes_of_lines
     places = {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
     return course._replace(lines={k: replace(x, places=places[k]) for k, x in course.lines.items()})

@@ -35,7 +35,7 @@ from hybrid.kernels.run.network_tangents import (
     advance_in_plane,
     advance_joined,
     blank_bodies,
-    blank_system_tangents,
+    blank_network_tangents,
     correct_beside,
 )
 from hybrid.kernels.state import books as b
@@ -68,7 +68,7 @@ from hybrid.kernels.watch.tangents import (
 from hybrid.model.build import Model, in_space, planar
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import weaknesses
-from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.network import NetworkModel, NetworkResolution, build_network
 from hybrid.model.resolution import Resolution
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
@@ -287,20 +287,20 @@ class _Tables(NamedTuple):
 
 
 class NetworkOthers:
-    """The systems of scenes with more of each number beside that of a run, and with less on its other side."""
+    """The networks of scenes with more of each number beside that of a run, and with less on its other side."""
 
     def __init__(
-        self, system: Network, scenes: Sequence[tuple[Network, Network | None]], steps: Sequence[float],
+        self, network: Network, scenes: Sequence[tuple[Network, Network | None]], steps: Sequence[float],
         lines: Mapping[str, Resolution], more: Places | None = None,
     ) -> None:  # fmt: skip
         """Tangents of a run, by scenes whose numbers differ by a step.
 
-        system: of the run; scenes: with more of each number by a step, and with less (None: it is not computed); lines:
-        how finely, by name; more: arc lengths of outputs beside nodes; None: as the scene asks.
+        network: of the run; scenes: with more of each number by a step, and with less (None: it is not computed);
+        lines: how finely, by name; more: arc lengths of outputs beside nodes; None: as the scene asks.
         """
-        self._system, self._more = system, more
+        self._network, self._more = network, more
         self._scenes, self._steps, self._resolution = list(scenes), list(steps), NetworkResolution(lines)
-        self._models = [build_system(more, self._resolution) for more, _ in scenes]
+        self._models = [build_network(more, self._resolution) for more, _ in scenes]
         self.sizes = np.zeros((len(scenes), len(lines), TANGENT_SIZES))
         self._first: list[list[Batch]] = []  # by number and line
         self._base: list[list[Batch]] = [[] for _ in lines]  # outputs of the run
@@ -310,14 +310,14 @@ class NetworkOthers:
     @property
     def are_flat(self) -> bool:
         """Whether all lines lie in one plane, whatever the number, and none is joined to what moves with it."""
-        every = [build_system(self._system, self._resolution), *self._models]
+        every = [build_network(self._network, self._resolution), *self._models]
         plane, joined = every[0].models[0].plane, any(k >= 0 for model in every for ends in model.joints for k in ends)
         return plane is not None and not joined and all(lie_in(plane, x) for model in every for x in model.models)
 
     def begin(self, run: Run) -> None:
         """Stand beside the state that a run begins with, and follow its steps from there on.  Unfollowed."""
         self._run, self._model = run, run.model
-        refuse_system(run)
+        refuse_network(run)
         self._others = []
         for k, (model, h) in enumerate(zip(self._models, self._steps, strict=True)):
             try:
@@ -477,7 +477,7 @@ class NetworkOthers:
             own.append(report)
             jobs.append(job)
         turns, bodies = solver.swap_states(states), [self._bind_bodies(x, solver, states[0]) for x in self._others]
-        asked, by, table = np.zeros(1, np.int64), np.zeros(2), Table(blank_system_tangents)
+        asked, by, table = np.zeros(1, np.int64), np.zeros(2), Table(blank_network_tangents)
         even, odd = solver.jobs_of_joined()
         table.bind(
             even=even.numbers, odd=odd.numbers, joined=turns["joined"], lone=turns["lone_lines"],
@@ -545,7 +545,7 @@ class NetworkOthers:
         if run.model is not self._model or (self._found != [run.steps, 0]).any():
             raise Unfollowed("a line, or what acts on it, becomes another one in the run")
         base = {l: joined(self._base[l]) for l, name in enumerate(self._model.names) if name in names}
-        here = self._looked_at(self._system, self._model, base, names)
+        here = self._looked_at(self._network, self._model, base, names)
         return [(here,), *(self._seen(p, base, names) for p in range(len(self._others)))]
 
     def _seen(
@@ -561,15 +561,15 @@ class NetworkOthers:
         if other is None:
             return (seen,)
         less = {l: opposite(base[l], x) for l, x in more.items()}
-        return seen, self._looked_at(other, build_system(other, self._resolution), less, names)
+        return seen, self._looked_at(other, build_network(other, self._resolution), less, names)
 
     def _looked_at(
-        self, system: Network, model: NetworkModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
+        self, network: Network, model: NetworkModel, batches: Mapping[int, Batch], names: Mapping[str, Sequence[str]]
     ) -> dict[str, Seen]:
         out = {}
         for l, batch in batches.items():
             name, x = model.names[l], model.models[l]
-            scene = system.scene_of(name, system.carried(name), system.guesses)
+            scene = network.scene_of(name, network.carried(name), network.guesses)
             if self._more is not None:
                 output = scene.output.model_copy(update={"points": at_nodes(x.line.s, self._more.get(name, ()))})
                 scene = replace(scene, output=output)
@@ -582,7 +582,7 @@ class NetworkOthers:
         return out
 
 
-def refuse_system(run: Run) -> None:
+def refuse_network(run: Run) -> None:
     """Unfollowed where a run has what the kernel does not know, with what that is."""
     model, what = run.model, dict[str, bool]()
     for x in model.models:

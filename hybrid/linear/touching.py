@@ -58,7 +58,7 @@ from hybrid.model.network import NetworkModel, NetworkResolution
 from hybrid.scene.network import Network
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
-from hybrid.simulation.run import static_system
+from hybrid.simulation.run import static_network
 from hybrid.solve.contact_statics import contact_stiffness
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState
@@ -381,11 +381,11 @@ class Rest:
     tips: Mapping[tuple[str, int], str] = field(default_factory=dict)  # points that are one end (0, 1) alone, in words
 
 
-def rest_of(system: Any, resolution: NetworkResolution) -> Rest:
+def rest_of(network: Any, resolution: NetworkResolution) -> Rest:
     """The equilibrium of a scene on such cells; ComputationError: there is none."""
-    form = system.form
+    form = network.form
     with form.in_words():
-        run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
+        run = static_network(network, None, lambda: scene_text(network), resolution=resolution)
     assert run.found is not None
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)
     found = run.found.solver  # which knows neither waves nor friction
@@ -397,17 +397,17 @@ def rest_of(system: Any, resolution: NetworkResolution) -> Rest:
     touching = TouchingLines(found, friction_between(model)) if run.found.settled else None
     return Rest(
         solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies, touching,
-        model.touching, {end: form.text(f"point {point}") for end, point in _tips(system, model).items()},
+        model.touching, {end: form.text(f"point {point}") for end, point in _tips(network, model).items()},
     )  # fmt: skip
 
 
-def _tips(system: Network, model: NetworkModel) -> dict[tuple[str, int], str]:
+def _tips(network: Network, model: NetworkModel) -> dict[tuple[str, int], str]:
     """Free points that are the end (0, 1) of one line alone, by that."""
     ends = [
-        ((name, k), getattr(system.lines[name], key)) for name in model.names for k, key in enumerate(("start", "end"))
+        ((name, k), getattr(network.lines[name], key)) for name in model.names for k, key in enumerate(("start", "end"))
     ]
     joints = [joint for pair in model.joints for joint in pair]
-    free = {name for name, point in system.points.items() if isinstance(point, FreePoint)}
+    free = {name for name, point in network.points.items() if isinstance(point, FreePoint)}
     return {end: point for (end, point), joint in zip(ends, joints, strict=True) if joint < 0 and point in free}
 
 

@@ -255,12 +255,12 @@ Ends = tuple[str, str]  # name of a line, and `start` or `end`
 Held = tuple[Triple, Triple | None]  # inertial tangent and material axis a1 of an end
 
 
-def directions_at_rigid(system: Network, point: str) -> dict[Ends, tuple[Floats, Floats]]:
+def directions_at_rigid(network: Network, point: str) -> dict[Ends, tuple[Floats, Floats]]:
     """Tangent and material axis a1 (3,) of each line that is clamped to a free point, in axes of the point."""
     found: dict[Ends, tuple[Floats, Floats]] = {}
-    here = system.clamped_at(point)
+    here = network.clamped_at(point)
     for name, end in here:
-        held = system.clamp(name, end)
+        held = network.clamp(name, end)
         assert held is not None
         tangent = np.array(held.tangent or STRAIGHT)
         if held.tangent is None and (name, end) != here[0] and end == here[0][1]:

@@ -443,7 +443,7 @@ def _of_ends(scene: LineScene, line: Line) -> Iterator[Entry]:
 
 @dataclass(frozen=True)
 class Touching:
-    """Which lines of a system may touch, K of them."""
+    """Which lines of a network may touch, K of them."""
 
     lines: tuple[int, ...]  # their numbers, in order
     meets: NDArray[np.int64]  # (K, K) whether two of them may touch, or one itself
@@ -469,13 +469,13 @@ class Touching:
 
 
 def touching_among(
-    system: Network, scenes: Mapping[str, LineScene], pairs: Iterable[tuple[int, int]]
+    network: Network, scenes: Mapping[str, LineScene], pairs: Iterable[tuple[int, int]]
 ) -> Touching | None:
     """Lines of which these pairs, by number, touch each other; None: there is no pair.
 
     scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
     """
-    names, pairs = list(system.lines), [*pairs]
+    names, pairs = list(network.lines), [*pairs]
     lines = sorted({k for pair in pairs for k in pair})
     if not lines:
         return None
@@ -483,13 +483,13 @@ def touching_among(
     meets, friction = np.zeros((len(lines), len(lines)), np.int64), np.zeros((len(lines), len(lines)))
     for a, b in pairs:
         for j, k in ((place[a], place[b]), (place[b], place[a])):
-            meets[j, k], friction[j, k] = 1, system.contact.friction if system.contact is not None else 0.0
+            meets[j, k], friction[j, k] = 1, network.contact.friction if network.contact is not None else 0.0
     for j, k in enumerate(lines):
-        line, scene = system.lines[names[k]], scenes[names[k]]
+        line, scene = network.lines[names[k]], scenes[names[k]]
         reach = self_reach(scene)
         if reach.asked or reach.may:
             meets[j, j], friction[j, j] = 1, line.contact.friction
-    return Touching(tuple(lines), meets, friction, joined_ends_of(system)[lines])
+    return Touching(tuple(lines), meets, friction, joined_ends_of(network)[lines])
 
 
 # Of the contents of a line that may come to touch others.
@@ -497,13 +497,13 @@ OTHERS = "contact with other lines"
 MEETS = Entry(OTHERS, True, "from where they come near each other; contact: {between: []} switches it off")
 
 
-def that_may_meet(system: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
+def that_may_meet(network: Network, scenes: Mapping[str, LineScene]) -> tuple[int, ...]:
     """Numbers of the lines that touch each other from where they come near, because a scene says nothing of contact.
 
     scenes: of the lines by name.  They have diameters, steps are given, and no error is estimated (scene.combinations).
     """
-    time = system.time
-    if system.contact is not None or system.dimension == 2 or time is None or not (time.step or time.tolerance):
+    time = network.time
+    if network.contact is not None or network.dimension == 2 or time is None or not (time.step or time.tolerance):
         return ()
     found = tuple(k for k, x in enumerate(scenes.values()) if _may_meet(x))
     return found if len(found) > 1 else ()
@@ -521,15 +521,15 @@ def _may_meet(scene: LineScene) -> bool:
     return scene.accuracy is None and not scene.output.errors and all(x.diameter is not None for x in sections)
 
 
-def joined_ends_of(system: Network) -> NDArray[np.int64]:
+def joined_ends_of(network: Network) -> NDArray[np.int64]:
     """(L, 2) what the ends of lines are joined to, a free point or body by number; 0: what is held or moved."""
-    free = {name: 1 + k for k, name in enumerate((*system.points, *system.bodies))}
-    joined = np.zeros((len(system.lines), 2), np.int64)
-    for k, line in enumerate(system.lines.values()):
+    free = {name: 1 + k for k, name in enumerate((*network.points, *network.bodies))}
+    joined = np.zeros((len(network.lines), 2), np.int64)
+    for k, line in enumerate(network.lines.values()):
         for end, point in enumerate((line.start, line.end)):
-            found = system.points[point]
+            found = network.points[point]
             if isinstance(found, FreePoint | GuidedPoint):
                 joined[k, end] = free[point]
-            elif isinstance(found, Fairlead) and isinstance(system.bodies[found.body], FreeBody):
+            elif isinstance(found, Fairlead) and isinstance(network.bodies[found.body], FreeBody):
                 joined[k, end] = free[found.body]
     return joined

@@ -1,4 +1,4 @@
-"""Lines that break from their points, and points that give way: what may break, and the system after it.
+"""Lines that break from their points, and points that give way: what may break, and the network after it.
 
 An end that comes loose alone is a free end of its line; ends that stay together are joined to a free point of their
 own without mass.  What was clamped bends there no more, and no torque passes through the catenary zones of its line.
@@ -31,31 +31,31 @@ class Weakness(NamedTuple):
     leaves: bool  # whether the ends leave their point; else the point comes with them
 
 
-def weaknesses(system: Network) -> tuple[Weakness, ...]:
+def weaknesses(network: Network) -> tuple[Weakness, ...]:
     """All that may break, lines first."""
-    names = list(system.lines)
+    names = list(network.lines)
     found = list[Weakness]()
 
     def may_break(text: str, ends: Iterable[tuple[int, int]], when: Failure, leaves: bool) -> None:
         found.append(Weakness(text, tuple(ends), when.time or np.inf, when.tension or np.inf, leaves))
 
-    for name, line in system.lines.items():
+    for name, line in network.lines.items():
         if line.break_at is not None:
             k = int(line.break_at.end == "end")
             point = (line.start, line.end)[k]
             may_break(f"line {name} breaks from point {point}", [(names.index(name), k)], line.break_at, True)
-    for name, point_ in system.points.items():
+    for name, point_ in network.points.items():
         failure = getattr(point_, "break_at", None)
         if failure is not None:
-            ends = ((names.index(x), int(end == "end")) for x, end in system.lines_at(name))
+            ends = ((names.index(x), int(end == "end")) for x, end in network.lines_at(name))
             may_break(f"point {name} gives way", ends, failure, False)
     return tuple(found)
 
 
 def after_failure(model: NetworkModel, weakness: Weakness, t: float) -> NetworkModel:
-    """The system with the ends of a weakness loose from t (s) on.
+    """The network with the ends of a weakness loose from t (s) on.
 
-    Those are, as far as they are at their point; the old system is as it was.
+    Those are, as far as they are at their point; the old network is as it was.
     """
     ends = [at for at in weakness.ends if at not in model.loose]
     points, loose = len(model.free), model.loose | (set(ends) if weakness.leaves else set())
@@ -80,7 +80,7 @@ def after_failure(model: NetworkModel, weakness: Weakness, t: float) -> NetworkM
 
 
 def _with_free_end(model: NetworkModel, line: int, k: int, t: float) -> NetworkModel:
-    """The system with an end (line, 0 or 1) that nothing holds from t (s) on."""
+    """The network with an end (line, 0 or 1) that nothing holds from t (s) on."""
     joints, seats, models = [list(x) for x in model.joints], model.seats.copy(), [*model.models]
     joints[line][k], seats[line, k] = -1, 0.0
     supports = {**model.supports, (line, k): models[line].ends}

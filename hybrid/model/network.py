@@ -59,9 +59,9 @@ class NetworkResolution:
     tolerance: float = TOLERANCE  # of Newton's method in steps
 
     @classmethod
-    def first(cls, system: Network) -> NetworkResolution:
+    def first(cls, network: Network) -> NetworkResolution:
         """The resolution for the accuracy of each line, before anything is known of its errors."""
-        return cls.of({name: system.scene_of(name) for name in system.lines})
+        return cls.of({name: network.scene_of(name) for name in network.lines})
 
     @classmethod
     def of(cls, scenes: Mapping[str, LineScene]) -> NetworkResolution:
@@ -87,7 +87,7 @@ class NetworkResolution:
 
 @dataclass(frozen=True)
 class NetworkModel:
-    """A system of lines made ready to compute."""
+    """A network of lines made ready to compute."""
 
     names: tuple[str, ...]  # of the lines
     models: tuple[Model, ...]  # of the lines; a free point is a body at the end of the line that carries it
@@ -100,7 +100,7 @@ class NetworkModel:
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
     seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.junctions.joined_lines)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
-    scenes: Mapping[str, LineScene]  # of the lines by name, with their points where the system has them
+    scenes: Mapping[str, LineScene]  # of the lines by name, with their points where the network has them
     resolution: NetworkResolution
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
     turns: tuple[tuple[float, float], ...]  # by which the start and the end of each line are twisted
@@ -191,80 +191,80 @@ class NetworkModel:
         return found
 
 
-def build_system(
-    system: Network, resolution: NetworkResolution | None = None, like: NetworkModel | None = None
+def build_network(
+    network: Network, resolution: NetworkResolution | None = None, like: NetworkModel | None = None
 ) -> NetworkModel:
-    """Make the model that a system requires, with its points and bodies where the scene has them first.
+    """Make the model that a network requires, with its points and bodies where the scene has them first.
 
     resolution: how finely, None: as the scene asks for; like: a model of the same lines, whose meshes are taken.
     Raises SceneError where a line cannot be meshed.
     """
-    made = bodies_of(system)
-    free, places, bodies = first_places(system, made)
-    resolution = resolution or NetworkResolution.first(system)
-    joined = _joined(system, places, bodies)
+    made = bodies_of(network)
+    free, places, bodies = first_places(network, made)
+    resolution = resolution or NetworkResolution.first(network)
+    joined = _joined(network, places, bodies)
     joint, fairleads = joined.joint, joined.fairleads
-    maker = FirstLines(system, joined, bodies, resolution)
+    maker = FirstLines(network, joined, bodies, resolution)
     if like is not None:
         maker.meshes = {name: model.mesh for name, model in zip(like.names, like.models, strict=True)}
     maker.turn_points()
-    models = [maker.model(name) for name in system.lines]
-    if system.surfaces:
-        models = _on_obstacles(system, models, made)
-    rides = _leave_own_bodies(system, models)
-    scenes = {name: system.scene_of(name) for name in system.lines}
-    names = list(system.lines)
-    pairs = ((names.index(a), names.index(b)) for a, b in system.meeting_pairs)
-    touching = touching_among(system, scenes, pairs)
+    models = [maker.model(name) for name in network.lines]
+    if network.surfaces:
+        models = _on_obstacles(network, models, made)
+    rides = _leave_own_bodies(network, models)
+    scenes = {name: network.scene_of(name) for name in network.lines}
+    names = list(network.lines)
+    pairs = ((names.index(a), names.index(b)) for a, b in network.meeting_pairs)
+    touching = touching_among(network, scenes, pairs)
     if touching is not None:
-        models = _with_contact(system, models, touching)
-    may_meet = that_may_meet(system, scenes)
+        models = _with_contact(network, models, touching)
+    may_meet = that_may_meet(network, scenes)
     for k in may_meet:
         x = models[k]
         line = x.line._replace(bits=x.line.bits | MAY_MEET)
         models[k] = replace(x, line=line, contents=(*x.contents, MEETS))
-    if _has_drag(system, models):
+    if _has_drag(network, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
-    ends = [(x.start, x.end) for x in system.lines.values()]
+    ends = [(x.start, x.end) for x in network.lines.values()]
     joints = tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends)
-    models = [_in_space(system, name, x, held) for name, x, held in zip(system.lines, models, joints, strict=True)]
-    if system.dimension == 2:
-        models = _kept_in_plane(system, models, joints)
+    models = [_in_space(network, name, x, held) for name, x, held in zip(network.lines, models, joints, strict=True)]
+    if network.dimension == 2:
+        models = _kept_in_plane(network, models, joints)
     known = maker.known
-    for name, body in system.bodies.items():
+    for name, body in network.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
             known[name] = KnownMotion(body, models[0].sea)
-    connections = [x.connections for x in system.lines.values()]
+    connections = [x.connections for x in network.lines.values()]
     turns = ((getattr(x.start, "turns", 0.0), getattr(x.end, "turns", 0.0)) for x in connections)
     return NetworkModel(
-        tuple(system.lines), tuple(models), free, system.rigid, joints, places, made, maker.bodies,
+        tuple(network.lines), tuple(models), free, network.rigid, joints, places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
-        maker.seats, known, scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
+        maker.seats, known, scenes, resolution, tuple(loads_of(network.moments_on(x)) for x in network.rigid),
         tuple(turns), touching, may_meet, rides=rides,
     )  # fmt: skip
 
 
-def with_surfaces(system: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
-    """Models of the lines of a system with what they may touch as `build_system` has it, in arrays of their own.
+def with_surfaces(network: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
+    """Models of the lines of a network with what they may touch as `build_network` has it, in arrays of their own.
 
     Bodies that carry some are where they are first.
     """
-    scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]
+    scenes = [network.scene_of(name, network.carried(name)) for name in network.lines]
     around = [surroundings(scene, x.line.h.size) for scene, x in zip(scenes, models, strict=True)]
-    models = _on_obstacles(system, [replace(x, sea=sea) for x, sea in zip(models, around, strict=True)], bodies)
-    _leave_own_bodies(system, models)
+    models = _on_obstacles(network, [replace(x, sea=sea) for x, sea in zip(models, around, strict=True)], bodies)
+    _leave_own_bodies(network, models)
     return models
 
 
-def _in_space(system: Network, name: str, model: Model, joints: tuple[int, int]) -> Model:
+def _in_space(network: Network, name: str, model: Model, joints: tuple[int, int]) -> Model:
     """The model of a line, without its plane where it is not computed in that; joints: of `NetworkModel`."""
-    line = system.lines[name]
-    carriers = [x for x in map(system.body_of, (line.start, line.end)) if isinstance(x, FixedBody)]
+    line = network.lines[name]
+    carriers = [x for x in map(network.body_of, (line.start, line.end)) if isinstance(x, FixedBody)]
     if max(joints) >= 0:
         why = "it is joined to what moves with it"
     elif any(x.motion != x.shift for x in carriers):
         why = "a body that turns moves its end"
-    elif system.dimension == 3:
+    elif network.dimension == 3:
         why = "dimension: 3"
     else:
         return model
@@ -272,9 +272,9 @@ def _in_space(system: Network, name: str, model: Model, joints: tuple[int, int])
     return replace(model, plane=None, contents=tuple(entries))
 
 
-def _kept_in_plane(system: Network, models: Sequence[Model], joints: Sequence[tuple[int, int]]) -> list[Model]:
+def _kept_in_plane(network: Network, models: Sequence[Model], joints: Sequence[tuple[int, int]]) -> list[Model]:
     """The models, whose lines must not leave the plane in which all of them are."""
-    scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]
+    scenes = [network.scene_of(name, network.carried(name)) for name in network.lines]
     tables = [(x.environment, x.ends, x.initial) for x in scenes]
     plane, _ = plane_of(scenes[0].environment, scenes[0].cable, scenes[0].ends, scenes[0].initial, TYPED, tables)
     axes = np.array([plane.p, plane.q, plane.normal])
@@ -289,54 +289,54 @@ def _kept_in_plane(system: Network, models: Sequence[Model], joints: Sequence[tu
     return found
 
 
-def first_places(system: Network, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:
+def first_places(network: Network, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:
     """Names and places (P, 3) m of free points at which lines turn freely, and states (B, STATE).
 
     States are of bodies and, behind them, of points, not turned yet, where the scene has them first.  made: the free
     bodies.
     """
-    rigid = system.rigid
+    rigid = network.rigid
     points = np.zeros((len(rigid), STATE))
-    points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
+    points[:, PLACE:FRAME] = np.array([network.first_place(x) for x in rigid]).reshape(-1, 3)
     points[:, FRAME:V] = np.eye(3).ravel()
     bodies = np.vstack([np.array([body.start for body in made]).reshape(-1, STATE), points])
-    free = tuple(x for x in system.free if x not in rigid)
-    return free, np.array([system.first_place(x) for x in free], float).reshape(-1, 3), bodies
+    free = tuple(x for x in network.free if x not in rigid)
+    return free, np.array([network.first_place(x) for x in free], float).reshape(-1, 3), bodies
 
 
-def first_lines(system: Network, made: Sequence[BodyModel], resolution: NetworkResolution) -> FirstLines:
+def first_lines(network: Network, made: Sequence[BodyModel], resolution: NetworkResolution) -> FirstLines:
     """What makes lines between first places of points and bodies, with free points that are not turned yet."""
-    _, places, bodies = first_places(system, made)
-    return FirstLines(system, _joined(system, places, bodies), bodies, resolution)
+    _, places, bodies = first_places(network, made)
+    return FirstLines(network, _joined(network, places, bodies), bodies, resolution)
 
 
-def bodies_of(system: Network) -> tuple[BodyModel, ...]:
-    """The free bodies of a system as numbers."""
-    environment, around = system.environment, None
+def bodies_of(network: Network) -> tuple[BodyModel, ...]:
+    """The free bodies of a network as numbers."""
+    environment, around = network.environment, None
     density = environment.fluid.density if environment.fluid is not None else 0.0
-    if any(body.members for body in system.free_bodies.values()):
-        around = surroundings(system.scene_of(next(iter(system.lines))), 1)
+    if any(body.members for body in network.free_bodies.values()):
+        around = surroundings(network.scene_of(next(iter(network.lines))), 1)
     return tuple(
-        body_model(name, body, density, environment.gravity, around) for name, body in system.free_bodies.items()
+        body_model(name, body, density, environment.gravity, around) for name, body in network.free_bodies.items()
     )
 
 
-def _leave_own_bodies(system: Network, models: Sequence[Model]) -> NDArray[np.int64]:
+def _leave_own_bodies(network: Network, models: Sequence[Model]) -> NDArray[np.int64]:
     """Which free bodies carry obstacles (M,), none: empty.
 
     A line meets the shape of a body that it is fixed to only beyond its way out of that, straight towards its other
     end.
     """
-    surfaces, numbers = list(system.surfaces), list(system.free_bodies)
-    for model, line in zip(models, system.lines.values(), strict=True):
+    surfaces, numbers = list(network.surfaces), list(network.free_bodies)
+    for model, line in zip(models, network.lines.values(), strict=True):
         carried, length = model.sea.values.carried, model.length
         places = [
-            model.start.r[-k] if system.is_free_end(x) else system.first_place(x)
+            model.start.r[-k] if network.is_free_end(x) else network.first_place(x)
             for k, x in enumerate((line.start, line.end))
         ]
         for end, name in enumerate((line.start, line.end)):
-            point = system.points[name]
-            shape = getattr(system.bodies[point.body], "shape", None) if isinstance(point, Fairlead) else None
+            point = network.points[name]
+            shape = getattr(network.bodies[point.body], "shape", None) if isinstance(point, Fairlead) else None
             if not isinstance(point, Fairlead) or shape is None:
                 continue
             k = surfaces.index(point.body)
@@ -348,24 +348,24 @@ def _leave_own_bodies(system: Network, models: Sequence[Model]) -> NDArray[np.in
                 carried[k, MEETS_TO] = length - out
             else:
                 carried[k, MEETS_FROM] = out
-    if not system.shaped:
+    if not network.shaped:
         return np.zeros(0, np.int64)
-    return np.array([numbers.index(x) if x in system.shaped else -1 for x in surfaces], np.int64)
+    return np.array([numbers.index(x) if x in network.shaped else -1 for x in surfaces], np.int64)
 
 
-def _on_obstacles(system: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
+def _on_obstacles(network: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
     """The models with obstacles as stiff as the pull of all lines, points and bodies asks for.
 
     A line that is cut lies on them as it does in one piece.
     """
-    pulls = [pull_on_obstacles(system.scene_of(name, system.carried(name))) for name in system.lines]
+    pulls = [pull_on_obstacles(network.scene_of(name, network.carried(name))) for name in network.lines]
     for body in bodies:
         row = np.zeros(NUMBERS)
         body.load(np.inf, 0.0, row)
         pulls.append(float(np.linalg.norm(row[FORCE : FORCE + 3]) + abs(body.numbers[LIFT])))
     found = []
-    for name, x in zip(system.lines, models, strict=True):
-        scene, rows = system.scene_of(name), x.sea.values.obstacles
+    for name, x in zip(network.lines, models, strict=True):
+        scene, rows = network.scene_of(name), x.sea.values.obstacles
         before = {e.what for e in obstacle_entries(scene, rows)}
         rows[:] = obstacle_rows(scene, sum(pulls))
         kept = tuple(e for e in x.contents if e.what not in before)
@@ -373,24 +373,24 @@ def _on_obstacles(system: Network, models: Sequence[Model], bodies: Sequence[Bod
     return found
 
 
-def _with_contact(system: Network, models: Sequence[Model], touching: Touching) -> list[Model]:
+def _with_contact(network: Network, models: Sequence[Model], touching: Touching) -> list[Model]:
     """The models of lines that touch each other from the start."""
-    names, found = list(system.lines), list(models)
-    assert system.contact is not None
+    names, found = list(network.lines), list(models)
+    assert network.contact is not None
     for k in touching.lines:
         others = ", ".join(names[j] for j in touching.partners(k))
-        entry = Entry(f"contact with {others}, friction {system.contact.friction:g}", True, "contact")
+        entry = Entry(f"contact with {others}, friction {network.contact.friction:g}", True, "contact")
         x = found[k]
         found[k] = replace(x, line=touching.bits(x.line), contents=(*x.contents, entry))
     return found
 
 
-def _has_drag(system: Network, models: Sequence[Model]) -> bool:
-    """Whether anything of a system has drag."""
-    members = [member for body in system.free_bodies.values() for member in body.members]
+def _has_drag(network: Network, models: Sequence[Model]) -> bool:
+    """Whether anything of a network has drag."""
+    members = [member for body in network.free_bodies.values() for member in body.members]
     return (
         not all(any(e.what == IDLE for e in x.contents) for x in models)
-        or any(getattr(point, "drag_area", 0.0) for point in system.points.values())
+        or any(getattr(point, "drag_area", 0.0) for point in network.points.values())
         or any(x.drag or x.axial_drag for x in members)
     )
 
@@ -404,15 +404,15 @@ class _Joined(NamedTuple):
     rows: dict[str, int]  # of those the body
 
 
-def _joined(system: Network, places: Floats, bodies: Floats) -> _Joined:
+def _joined(network: Network, places: Floats, bodies: Floats) -> _Joined:
     """places: (P, 3) m of the free points; bodies: (B, STATE) of the free bodies and the points behind them."""
-    rigid = system.rigid
-    free, free_bodies = tuple(x for x in system.free if x not in rigid), list(system.free_bodies)
+    rigid = network.rigid
+    free, free_bodies = tuple(x for x in network.free if x not in rigid), list(network.free_bodies)
     carriers = [*free_bodies, *rigid]
     at: dict[str, Any] = dict(zip(free, map(tuple, places.tolist()), strict=True))
     joint = {name: k for k, name in enumerate(free)}
     fairleads: dict[str, Any] = {}
-    for name, point in system.points.items():
+    for name, point in network.points.items():
         carrier = point.body if isinstance(point, Fairlead) else name
         if carrier in (free_bodies if isinstance(point, Fairlead) else rigid):
             row = bodies[carriers.index(carrier)]
@@ -422,13 +422,13 @@ def _joined(system: Network, places: Floats, bodies: Floats) -> _Joined:
     return _Joined(at, joint, fairleads, {x: joint[x] - len(free) for x in fairleads})
 
 
-def starts_between(system: Network, places: Floats, bodies: Floats, model: NetworkModel) -> tuple[list[State], Floats]:
+def starts_between(network: Network, places: Floats, bodies: Floats, model: NetworkModel) -> tuple[list[State], Floats]:
     """Shapes of the lines of a model to begin with, hung between other places of its points and bodies.
 
     places: (P, 3) m of the free points; bodies: (B, STATE), which are returned too, with the axes of points that lines
     are clamped to.
     """
-    maker = FirstLines(system, _joined(system, places, bodies), bodies, model.resolution, model)
+    maker = FirstLines(network, _joined(network, places, bodies), bodies, model.resolution, model)
     maker.turn_points()
     return [maker.start(name, each) for name, each in zip(model.names, model.models, strict=True)], maker.bodies
 
@@ -437,15 +437,15 @@ class FirstLines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
-        self, system: Network, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
+        self, network: Network, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
         before: NetworkModel | None = None,
     ) -> None:  # fmt: skip
         """before: a model that was made before, whose seats hold; None: as the first shapes lie."""
         seats = None if before is None else before.seats
-        self._system, self._at, self.bodies, self._rows = system, joined.at, bodies.copy(), joined.rows
-        self._given, self._names, self._resolution = seats, list(system.lines), resolution.lines
+        self._network, self._at, self.bodies, self._rows = network, joined.at, bodies.copy(), joined.rows
+        self._given, self._names, self._resolution = seats, list(network.lines), resolution.lines
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
-        self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
+        self._at_rigid = {end: x for p in network.rigid for end, x in directions_at_rigid(network, p).items()}
         self.meshes: dict[str, Any] = {}  # of lines that have one already, as of `Model.mesh`
         self.known: dict[str, KnownMotion] = {}  # motions of bodies, which are added when first asked for
 
@@ -455,11 +455,11 @@ class FirstLines:
         Of points that are left the next is one that a line leads to from where its material axis a1 is known: so the
         twist that both ends of a line that is cut ask for is less than half a turn, as of the line in one piece.
         """
-        left, system = list(self._system.rigid), self._system
+        left, network = list(self._network.rigid), self._network
         while left:
-            known = {p: [at for at in system.clamped_at(p) if self._leads_from_known(at, left)] for p in left}
+            known = {p: [at for at in network.clamped_at(p) if self._leads_from_known(at, left)] for p in left}
             point = next((p for p in left if known[p]), left[0])
-            here = [*known[point], *(at for at in system.clamped_at(point) if at not in known[point])]
+            here = [*known[point], *(at for at in network.clamped_at(point) if at not in known[point])]
             models = {name: self._shape(name, self.directions(name, left)) for name, _ in here}
             far = None
             if known[point]:
@@ -473,10 +473,10 @@ class FirstLines:
         """Whether the other end of a line is clamped where axes are known, and holds its twist; left: not known yet."""
         name, end = at
         other = "start" if end == "end" else "end"
-        held, point = self._system.clamp(name, other), getattr(self._system.lines[name], other)
+        held, point = self._network.clamp(name, other), getattr(self._network.lines[name], other)
         if held is None or held.swivel or point in left:
             return False
-        return held.normal is not None or point in self._system.rigid
+        return held.normal is not None or point in self._network.rigid
 
     def axes(self, point: str) -> Floats | None:
         """Axes (3, 3) of what carries a point; None: nothing that is free does."""
@@ -484,19 +484,19 @@ class FirstLines:
         return None if row is None else self.bodies[row, FRAME:V].reshape(3, 3)
 
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
-        scene, mesh, line = self.scene(name, (), directions), self.meshes.get(name), self._system.lines[name]
-        alone = not any(self._system.is_joined(point) for point in (line.start, line.end))
+        scene, mesh, line = self.scene(name, (), directions), self.meshes.get(name), self._network.lines[name]
+        alone = not any(self._network.is_joined(point) for point in (line.start, line.end))
         with naming_connection(name):
             return build(scene, self._resolution[name], mesh, spare=alone or bool(reachable_obstacles(scene)))
 
     def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> LineScene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
-        return self._system.scene_of(name, carried, self._at, directions)
+        return self._network.scene_of(name, carried, self._at, directions)
 
     def directions(self, name: str, left: Sequence[str] = ()) -> dict[str, Any]:
         """Inertial directions in which the line is clamped, by end; left: points whose axes are not known yet."""
         found: dict[str, Any] = {}
-        line = self._system.lines[name]
+        line = self._network.lines[name]
         for k, (end, point) in enumerate((("start", line.start), ("end", line.end))):
             axes = self.axes(point)
             if point in left:
@@ -506,9 +506,11 @@ class FirstLines:
             elif axes is not None and (name, end) in self._at_rigid:
                 found[end] = tuple(tuple((axes @ x).tolist()) for x in self._at_rigid[name, end])
             else:
-                found[end] = self._system.direction(name, end)
-        clamps = [self._system.clamp(name, end) for end in ("start", "end")]
-        guessed = self._system.is_joined(line.start) or self._system.is_joined(line.end)  # else the first shape counts
+                found[end] = self._network.direction(name, end)
+        clamps = [self._network.clamp(name, end) for end in ("start", "end")]
+        guessed = self._network.is_joined(line.start) or self._network.is_joined(
+            line.end
+        )  # else the first shape counts
         if guessed and all(x is not None and not x.swivel for x in clamps) and found["start"] and found["end"]:
             found["start"], found["end"] = untwisted(found["start"], found["end"])
         return found
@@ -521,21 +523,21 @@ class FirstLines:
 
     def model(self, name: str) -> Model:
         """The model of a line: its loads with the points that it carries, its first shape between held places."""
-        system, l = self._system, self._names.index(name)
+        network, l = self._network, self._names.index(name)
         directions = self.directions(name)
-        clamps = [system.clamp(name, end) for end in ("start", "end")]
+        clamps = [network.clamp(name, end) for end in ("start", "end")]
         model = self._shape(name, directions)
-        carried = system.carried(name)
+        carried = network.carried(name)
         if carried:
             other = build(self.scene(name, carried, directions), self._resolution[name], model.mesh, like=model)
             held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
             other = with_clamps(other, model, held)
             other.ends.values.frame[held] = model.ends.values.frame[held]
             model = replace(other, start=model.start, start_shape=model.start_shape)
-        for k, point in enumerate((system.lines[name].start, system.lines[name].end)):
-            found, body, axes = system.points[point], system.body_of(point), self.axes(point)
+        for k, point in enumerate((network.lines[name].start, network.lines[name].end)):
+            found, body, axes = network.points[point], network.body_of(point), self.axes(point)
             if clamps[k] is not None and axes is not None and self._given is None:
-                kind = WITH_POINT if point in system.rigid else WITH_BODY
+                kind = WITH_POINT if point in network.rigid else WITH_BODY
                 self.seats[l, k] = seat_of(model.ends.values.frame[k], axes, kind)
             if isinstance(found, Fairlead) and isinstance(body, FixedBody) and body.motion is not None:
                 motion = self.known.setdefault(found.body, KnownMotion(body, model.sea))
@@ -544,7 +546,7 @@ class FirstLines:
         return model
 
 
-def balanced_places(system: Network, model: NetworkModel) -> tuple[Floats, Floats] | None:
+def balanced_places(network: Network, model: NetworkModel) -> tuple[Floats, Floats] | None:
     """Places (P, 3) m of free points and (B, STATE) of bodies at which elastic catenaries balance.
 
     None: they are not found.
@@ -552,10 +554,10 @@ def balanced_places(system: Network, model: NetworkModel) -> tuple[Floats, Float
     the places, so that Newton's method with shortened steps finds them from anywhere.
     """
     points, count = len(model.free), len(model.body_places)
-    held = {name: np.array(system.first_place(name)) for name in system.points if system.is_held(name)}
+    held = {name: np.array(network.first_place(name)) for name in network.points if network.is_held(name)}
     if not points + count or not held:
         return model.places, model.body_places
-    lines, loads = list(system.lines.values()), [_loads(each) for each in model.models]
+    lines, loads = list(network.lines.values()), [_loads(each) for each in model.models]
     reach = FARTHEST * min(each.length for each in model.models)
     frames = model.body_places[:, FRAME:V].reshape(-1, 3, 3)
     numbers = model.body_numbers(np.inf)
@@ -572,7 +574,7 @@ def balanced_places(system: Network, model: NetworkModel) -> tuple[Floats, Float
             out[points + b, 2] += row[LIFT] - row[STIFFNESS] * (places[points + b, 2] - row[LEVEL])
             K[o, o] -= row[STIFFNESS]
         for l, (line, each, load, joints) in enumerate(zip(lines, model.models, loads, model.joints, strict=True)):
-            loose = [system.is_free_end(p) for p in (line.start, line.end)]
+            loose = [network.is_free_end(p) for p in (line.start, line.end)]
             if any(loose):  # it hangs from its other end with all that acts on it
                 for k in (0, 1):
                     if joints[k] >= 0:

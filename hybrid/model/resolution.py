@@ -159,9 +159,11 @@ class RequestedAccuracy:
     def asks(self, name: str) -> bool:
         """Whether an output is asked for: position, tension (of the line), curvature, bending_moment, an end force."""
         asked = {
-            "position": self.position, "curvature": self.of_curvature, "bending_moment": self.of_moment,
+            "position": self.position,
+            "curvature": self.of_curvature,
+            "bending_moment": self.of_moment,
             "tension": self.of_tension,
-        }  # fmt: skip
+        }
         return asked.get(name, self.tension or self.of_end_force) is not None
 
     @property

@@ -26,7 +26,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out"]
 # Beside the tables.
 USE = "use"  # what is to be done with the scene
-SYSTEM = "system"  # of a line of several the scene of all of them
+NETWORK = "network"  # of a line of several the scene of all of them
 LINE = "line"  # and its name
 Use = Literal["", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
@@ -96,7 +96,7 @@ def tables_of(scene: Table, use: Use = "") -> Iterator[dict[str, Any]]:
         return
     for name, line in tables["lines"].items():
         own = {key: getattr(line, key) for key in ("connections", "mesh", "resolution", "contact", "initial")}
-        yield tables | own | {"model": line.chosen_model, "cable": line.cable, SYSTEM: scene, LINE: name}
+        yield tables | own | {"model": line.chosen_model, "cable": line.cable, NETWORK: scene, LINE: name}
 
 
 # What the tables of a line have, whose keys are below the line in a scene of several.
@@ -106,7 +106,7 @@ _OF_LINE = ("connections", "mesh", "resolution", "contact", "initial", "model")
 def _placed(tables: Tables, at: Place) -> Place:
     """Where a key of the tables of a line is in the scene of several."""
     name = tables.get(LINE)
-    if at == ("contact",):  # of the system; of a line it has a key
+    if at == ("contact",):  # of the network; of a line it has a key
         return at
     if name is not None and at[:1] == ("cable",):
         return "lines", name, *at[1:]
@@ -184,7 +184,7 @@ def _damped_otherwise(tables: Tables) -> Iterator[Place]:
     sections = [section for _, section in _sections(tables)]
     restrictors = [x for x in (cable.attachments if cable is not None else ()) if x.kind == "bend_restrictor"]
     laws = any(x.curve or x.dynamic_stiffness or x.moment_curvature or x.tension_torque for x in sections)
-    if laws or restrictors or (SYSTEM in tables and any(_clamped_to_free(tables))):
+    if laws or restrictors or (NETWORK in tables and any(_clamped_to_free(tables))):
         yield from _in_sections("damping", "stiffness", of=_damped)(tables)
 
 
@@ -261,13 +261,13 @@ def _clamped(tables: Tables) -> Iterator[Place]:
 def _clamped_to_free(tables: Tables) -> Iterator[Place]:
     """Clamps to free points and free bodies, which turn by the moments of their lines."""
     for at in _clamped(tables):
-        if tables[SYSTEM].is_joined(getattr(tables["lines"][tables[LINE]], str(at[1]))):
+        if tables[NETWORK].is_joined(getattr(tables["lines"][tables[LINE]], str(at[1]))):
             yield at
 
 
 def _shapes(tables: Tables) -> Iterator[Place]:
     """Shapes of bodies that lines touch."""
-    return (("bodies", name, "shape") for name in (tables[SYSTEM].shaped if SYSTEM in tables else ()))
+    return (("bodies", name, "shape") for name in (tables[NETWORK].shaped if NETWORK in tables else ()))
 
 
 def _moving_obstacles(tables: Tables) -> Iterator[Place]:
@@ -277,7 +277,7 @@ def _moving_obstacles(tables: Tables) -> Iterator[Place]:
 
 def _lines_touch(tables: Tables) -> Iterator[Place]:
     """A line of several that touches another one."""
-    if SYSTEM in tables and any(tables[LINE] in pair for pair in tables[SYSTEM].touching_pairs):
+    if NETWORK in tables and any(tables[LINE] in pair for pair in tables[NETWORK].touching_pairs):
         yield ("contact",)
 
 
@@ -285,8 +285,8 @@ def _changing_loads(tables: Tables) -> Iterator[Place]:
     """Forces and moments on ends, points and bodies that follow a history or end at a time."""
     ends: Ends | None = tables.get("ends")
     holders: list[tuple[Place, Any]] = [(("ends", x), end) for x, end in ends.named().items()] if ends else []
-    if SYSTEM in tables:
-        holders = [((key, x), one) for key in ("points", "bodies") for x, one in getattr(tables[SYSTEM], key).items()]
+    if NETWORK in tables:
+        holders = [((key, x), one) for key in ("points", "bodies") for x, one in getattr(tables[NETWORK], key).items()]
     for at, holder in holders:
         for name in ("force", "moment", "thrust"):
             load = getattr(holder, name, None)
@@ -313,24 +313,29 @@ def _used(*uses: Use) -> Callable[[Tables], Iterator[Place]]:
 
 MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
 TWO_STIFFNESSES = Feature(
-    "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
+    "two bending stiffnesses",
+    "bending_stiffness: [EI_1, EI_2]",
     _in_sections("bending_stiffness", of=lambda x: x.anisotropic),
-)  # fmt: skip
-TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
-                            _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
+)
+TORQUE_OF_TENSION = Feature(
+    "torque of tension", "tension_torque", _in_sections("tension_torque", of=lambda x: x.tension_torque)
+)
 VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
 SLIP = Feature(
     "layers that slip as a line bends, a bending stiffness that grows with tension, a bend restrictor on two bending "
     "stiffnesses, a table of moment beside them",
-    "bending_slip, first_loading, stiffness_per_tension, attachments: kind: bend_restrictor, moment_curvature", _slips,
-)  # fmt: skip
+    "bending_slip, first_loading, stiffness_per_tension, attachments: kind: bend_restrictor, moment_curvature",
+    _slips,
+)
 DAMPED_OTHERWISE = Feature(
     "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
-    "damping.stiffness", _damped_otherwise,
-)  # fmt: skip
+    "damping.stiffness",
+    _damped_otherwise,
+)
 TURNS = Feature("turns at an end", "ends.end.turns", _turns)
-TORSION = Feature("turns at an end, torque of tension", "ends.end.turns, tension_torque",
-                  _either(TURNS, TORQUE_OF_TENSION))  # fmt: skip
+TORSION = Feature(
+    "turns at an end, torque of tension", "ends.end.turns, tension_torque", _either(TURNS, TORQUE_OF_TENSION)
+)
 PLANE = Feature("a plane", "dimension: 2", _plane)
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
@@ -348,9 +353,11 @@ CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step",
                        _asks("time", "step", lambda x: x.step is None and x.tolerance is None))  # fmt: skip
 ESTIMATED = Feature("estimated errors, accuracy, steps that it chooses", "accuracy, output.errors, no time.step",
                     _either(CHOSEN_STEPS, ACCURACY, ERRORS))  # fmt: skip
-SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "initial.friction",
-                           _asks("initial", "friction",
-                                 lambda x: getattr(x, "friction", None) == "settled"))  # fmt: skip
+SETTLED_FRICTION = Feature(
+    "friction that has settled in the equilibrium",
+    "initial.friction",
+    _asks("initial", "friction", lambda x: getattr(x, "friction", None) == "settled"),
+)
 
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))

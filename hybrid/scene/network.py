@@ -453,7 +453,7 @@ class Network(SceneTables, Asked):
 
     @cached_property
     def _made_scenes(self) -> tuple[dict[str, Any], dict[Any, Any]]:
-        """The tables of this system, and `_known_scenes`."""
+        """The tables of this network, and `_known_scenes`."""
         return {name: getattr(self, name) for name in type(self).model_fields}, {}
 
     def _scene_of(self, name: str, carrying: Sequence[str]) -> LineScene:

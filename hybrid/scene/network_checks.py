@@ -24,79 +24,79 @@ from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.start_checks import SAME_LENGTH
 
 
-def findings_of(system: Network) -> Iterator[Iterator[Finding]]:
-    """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
-    yield _unknown_names(system)
-    yield _refused_combinations(system)
-    yield chain(_lonely_points(system), () if system.starts_as_placed else floating_groups(system))
-    yield _start_findings(system)
-    yield connection_findings(system)
-    yield _touching_findings(system)
-    yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
-    yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
-    yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
-    yield _in_a_plane(system)
-    yield travel_findings(system)
-    yield elevation_has_waves(system.output, system.environment)
-    yield accuracy_has_errors(_accuracy_asked(system), system.output)
-    yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
+def findings_of(network: Network) -> Iterator[Iterator[Finding]]:
+    """What contradicts in a network, in groups: of the first one with findings no later one makes sense."""
+    yield _unknown_names(network)
+    yield _refused_combinations(network)
+    yield chain(_lonely_points(network), () if network.starts_as_placed else floating_groups(network))
+    yield _start_findings(network)
+    yield connection_findings(network)
+    yield _touching_findings(network)
+    yield chain.from_iterable(_body_findings(network, name) for name in network.bodies)
+    yield chain.from_iterable(_moment_findings(network, name) for name in network.points)
+    yield chain.from_iterable(_line_findings(network, name) for name in network.lines)
+    yield _in_a_plane(network)
+    yield travel_findings(network)
+    yield elevation_has_waves(network.output, network.environment)
+    yield accuracy_has_errors(_accuracy_asked(network), network.output)
+    yield of_several_lines(network.output.quantities, network.lines, network.environment.seabed is not None)
 
 
-def _refused_combinations(system: Network) -> Iterator[Finding]:
-    yield from dict.fromkeys(x for tables in tables_of(system) for x in refused(tables))
+def _refused_combinations(network: Network) -> Iterator[Finding]:
+    yield from dict.fromkeys(x for tables in tables_of(network) for x in refused(tables))
 
 
-def _unknown_names(system: Network) -> Iterator[Finding]:
-    for name, line in system.lines.items():
+def _unknown_names(network: Network) -> Iterator[Finding]:
+    for name, line in network.lines.items():
         for key in ("start", "end"):
-            yield from _unknown(getattr(line, key), system.points, ("lines", name, key), "point")
-    for name, point in system.points.items():
+            yield from _unknown(getattr(line, key), network.points, ("lines", name, key), "point")
+    for name, point in network.points.items():
         if isinstance(point, Fairlead):
-            yield from _unknown(point.body, system.bodies, ("points", name, "body"), "body")
-    for i, pair in enumerate(system.contact.between or () if system.contact is not None else ()):
+            yield from _unknown(point.body, network.bodies, ("points", name, "body"), "body")
+    for i, pair in enumerate(network.contact.between or () if network.contact is not None else ()):
         for k, name in enumerate(pair):
-            yield from _unknown(name, system.lines, ("contact", "between", i, k), "line")
+            yield from _unknown(name, network.lines, ("contact", "between", i, k), "line")
         if pair[0] == pair[1]:
             expected = "two lines; whether a line touches itself is asked by lines.NAME.contact"
             yield Finding(("contact", "between", i), expected, "name another line, or leave the pair out")
-    points = system.output.points
-    for key, names in (("history", system.output.history), ("points", points if isinstance(points, dict) else {})):
+    points = network.output.points
+    for key, names in (("history", network.output.history), ("points", points if isinstance(points, dict) else {})):
         for name in names:
-            yield from _unknown(name, system.lines, ("output", key, name), "line")
+            yield from _unknown(name, network.lines, ("output", key, name), "line")
 
 
-def _lonely_points(system: Network) -> Iterator[Finding]:
-    for name, point in system.points.items():
-        if not system.lines_at(name):
+def _lonely_points(network: Network) -> Iterator[Finding]:
+    for name, point in network.points.items():
+        if not network.lines_at(name):
             kind = "a free point" if isinstance(point, FreePoint) else "a point"
             expected = f"{kind} at which a line starts or ends"
             yield Finding(
                 ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
             )
         elif isinstance(point, GuidedPoint):
-            yield from _guided_findings(system, name)
-        elif isinstance(point, FreePoint) and point.initial_guess is None and not system.is_free_end(name):
+            yield from _guided_findings(network, name)
+        elif isinstance(point, FreePoint) and point.initial_guess is None and not network.is_free_end(name):
             expected = "three numbers [x, y, z], in m, from where the equilibrium of the lines that meet here is sought"
             yield Finding(("points", name, "initial_guess"), expected, "add `initial_guess: [x, y, z]` (m)", "nothing")
-        elif isinstance(point, FreePoint) and all(system.breaks(*at) for at in system.lines_at(name)):
-            line, _ = system.lines_at(name)[0]
+        elif isinstance(point, FreePoint) and all(network.breaks(*at) for at in network.lines_at(name)):
+            line, _ = network.lines_at(name)[0]
             expected = f"a line at point {name} that does not break there and carries what is left"
             fix = "leave it out of one of them, or let it break at its other end"
             yield Finding(("lines", line, "break_at"), expected, fix)
-    on = {point.body for point in system.points.values() if isinstance(point, Fairlead)}
-    for name in system.bodies:
-        if name not in on and name not in system.shaped:
+    on = {point.body for point in network.points.values() if isinstance(point, Fairlead)}
+    for name in network.bodies:
+        if name not in on and name not in network.shaped:
             fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
             yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
 
 
-def _guided_findings(system: Network, name: str) -> Iterator[Finding]:
+def _guided_findings(network: Network, name: str) -> Iterator[Finding]:
     """What is wrong with a guided point: one line is clamped there, in a direction of the world."""
-    (line, end), *others = system.lines_at(name)
+    (line, end), *others = network.lines_at(name)
     if others:
         expected = "free, because a guided point is the end of one line, and several end here"
         yield Finding(("points", name, "kind"), expected, "clamp the lines to each other: `kind: free`", "guided")
-    held, at = system.clamp(line, end), ("lines", line, "connections", end)
+    held, at = network.clamp(line, end), ("lines", line, "connections", end)
     if held is None or held.tangent is None:
         expected = f"the direction in which point {name} holds the line"
         yield Finding((*at, "tangent"), expected, "add `tangent: [0, 0, 1]`", "nothing")
@@ -107,132 +107,132 @@ def _guided_findings(system: Network, name: str) -> Iterator[Finding]:
         yield Finding((*at, key), expected, "leave it out")
 
 
-def floating_groups(system: Network) -> Iterator[Finding]:
+def floating_groups(network: Network) -> Iterator[Finding]:
     """Free points and bodies from which no way along lines leads to what is fixed: none of them has an equilibrium."""
-    ways = [{x.start, x.end} for x in system.lines.values()]
-    ways += [{p, f"body {x.body}"} for p, x in system.points.items() if isinstance(x, Fairlead)]
-    held = {name for name, point in system.points.items() if isinstance(point, FixedPoint)}
-    fluid = system.environment.fluid
-    if system.environment.seabed is not None or (fluid is not None and fluid.surface is not None):  # may bear a line
-        alone = [x for x in system.lines.values() if system.is_free_end(x.start) and system.is_free_end(x.end)]
+    ways = [{x.start, x.end} for x in network.lines.values()]
+    ways += [{p, f"body {x.body}"} for p, x in network.points.items() if isinstance(x, Fairlead)]
+    held = {name for name, point in network.points.items() if isinstance(point, FixedPoint)}
+    fluid = network.environment.fluid
+    if network.environment.seabed is not None or (fluid is not None and fluid.surface is not None):  # may bear a line
+        alone = [x for x in network.lines.values() if network.is_free_end(x.start) and network.is_free_end(x.end)]
         held |= {p for x in alone for p in (x.start, x.end)}  # each of them is judged by itself
-    held |= {f"body {name}" for name, body in system.bodies.items() if isinstance(body, FixedBody)}
+    held |= {f"body {name}" for name, body in network.bodies.items() if isinstance(body, FixedBody)}
     while more := {p for way in ways if way & held for p in way} - held:
         held |= more
-    for name, point in system.points.items():
+    for name, point in network.points.items():
         if name not in held and isinstance(point, FreePoint):
             expected = "a free point that lines join to a fixed one, at least by way of others"
             yield Finding(("points", name), expected, "make one of these points `kind: fixed`", "nothing holds it")
-    for name in system.bodies:
-        if f"body {name}" not in held and name not in system.shaped:
+    for name in network.bodies:
+        if f"body {name}" not in held and name not in network.shaped:
             expected = "a free body that lines join to what is fixed, at least by way of other points"
             yield Finding(("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it")
 
 
-def _start_findings(system: Network) -> Iterator[Finding]:
+def _start_findings(network: Network) -> Iterator[Finding]:
     """Lines of which some start in equilibrium and others do not, and a velocity that points do not have."""
-    placed = [name for name, line in system.lines.items() if not isinstance(line.initial, Equilibrium)]
-    for name, line in system.lines.items() if placed else ():
+    placed = [name for name, line in network.lines.items() if not isinstance(line.initial, Equilibrium)]
+    for name, line in network.lines.items() if placed else ():
         if isinstance(line.initial, Equilibrium):
             expected = f"straight or points, because line {placed[0]} starts so, and nothing is in equilibrium then"
             fix = "say so of every line; points and bodies start at rest where initial_guess has them"
             yield Finding(("lines", name, "initial"), expected, fix, "equilibrium")
-        elif any(getattr(line.initial, "velocity", None) or ()) and any(map(system.is_joined, (line.start, line.end))):
+        elif any(getattr(line.initial, "velocity", None) or ()) and any(map(network.is_joined, (line.start, line.end))):
             expected = "rest, because the points of the line start at rest"
             yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
 
 
-def _touching_findings(system: Network) -> Iterator[Finding]:
+def _touching_findings(network: Network) -> Iterator[Finding]:
     """Lines that touch others have a diameter, and there are others."""
-    if system.contact is not None and len(system.lines) == 1:
+    if network.contact is not None and len(network.lines) == 1:
         expected = "nothing, because there is one line; whether it touches itself is asked by lines.NAME.contact"
         yield Finding(("contact",), expected, "leave it out")
-    for name in dict.fromkeys(x for pair in system.touching_pairs for x in pair):
+    for name in dict.fromkeys(x for pair in network.touching_pairs for x in pair):
         why = "which lines that touch each other keep apart (contact)"
-        yield from without_diameter(system.lines[name].sections, ("lines", name, "sections"), why)
+        yield from without_diameter(network.lines[name].sections, ("lines", name, "sections"), why)
 
 
-def _body_findings(system: Network, name: str) -> Iterator[Finding]:
+def _body_findings(network: Network, name: str) -> Iterator[Finding]:
     """What is wrong with the motion of a body, or with what is given to act on it."""
-    body, still = system.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+    body, still = network.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
     if isinstance(body, FreeBody):
         in_water = [key for key in ("volume", "hydrostatics", "damping", "added_mass", "members") if getattr(body, key)]
-        if in_water and system.environment.fluid is None:
+        if in_water and network.environment.fluid is None:
             expected = f"a fluid, because body {name} has {in_water[0]}"
             yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")
-    joined = (x for x in system.lines.values() for p in (x.start, x.end) if system.body_of(p) is body)
-    line = next(joined, next(iter(system.lines.values())))
-    if name in system.shaped and name in system.obstacles:
+    joined = (x for x in network.lines.values() for p in (x.start, x.end) if network.body_of(p) is body)
+    line = next(joined, next(iter(network.lines.values())))
+    if name in network.shaped and name in network.obstacles:
         expected = f"a name that no obstacle has, because body {name} has a shape"
         yield Finding(("obstacles", name), expected, "name the one or the other differently")
     ends = Ends(start=still, end=body.end) if isinstance(body, FreeBody) else None
     if isinstance(body, FixedBody):
         moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
         ends = Ends(start=moved, end=Free())
-    yield from _load_findings(system, ends, line, ("bodies", name))
+    yield from _load_findings(network, ends, line, ("bodies", name))
 
 
-def _moment_findings(system: Network, name: str) -> Iterator[Finding]:
+def _moment_findings(network: Network, name: str) -> Iterator[Finding]:
     """What is wrong with the moment on a free point."""
-    point, still = system.points[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+    point, still = network.points[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
     if isinstance(point, FreePoint) and point.moment is not None:
-        ends, (line, _) = Ends(start=still, end=Free(moment=point.moment)), system.lines_at(name)[0]
-        yield from _load_findings(system, ends, system.lines[line], ("points", name))
+        ends, (line, _) = Ends(start=still, end=Free(moment=point.moment)), network.lines_at(name)[0]
+        yield from _load_findings(network, ends, network.lines[line], ("points", name))
 
 
-def _accuracy_asked(system: Network) -> Accuracy | None:
+def _accuracy_asked(network: Network) -> Accuracy | None:
     """What is asked of all lines, or of one; a chosen model brings along that of steps that follow the motion."""
-    follows = system.time is not None and system.time.controlled
-    of_lines = () if follows else (line.accuracy for line in system.lines.values())
-    return system.accuracy or next((x for x in of_lines if x is not None), None)
+    follows = network.time is not None and network.time.controlled
+    of_lines = () if follows else (line.accuracy for line in network.lines.values())
+    return network.accuracy or next((x for x in of_lines if x is not None), None)
 
 
-def _load_findings(system: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
-    """What is wrong with motions and loads of ends that stand for what is at another place of the system."""
-    tables = {"ends": ends, "time": system.time, "cable": line.cable, "environment": system.environment}
+def _load_findings(network: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
+    """What is wrong with motions and loads of ends that stand for what is at another place of the network."""
+    tables = {"ends": ends, "time": network.time, "cable": line.cable, "environment": network.environment}
     for found in motion_findings(tables):
         where = (*at, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
         yield Finding(where, found.expected, found.fix, found.given)
 
 
-def contradictions_of(system: Network, name: str, carrying: Sequence[str] = ()) -> list[Finding]:
+def contradictions_of(network: Network, name: str, carrying: Sequence[str] = ()) -> list[Finding]:
     """What contradicts in a line, each under the key that the short form has for it; carrying: as of `scene_of`."""
-    tables = dict(vars(system.scene_of(name, carrying)))
-    if system.output.errors is False:  # that of all lines is judged by itself (`accuracy_has_errors`)
+    tables = dict(vars(network.scene_of(name, carrying)))
+    if network.output.errors is False:  # that of all lines is judged by itself (`accuracy_has_errors`)
         tables["accuracy"] = None
     return contradictions(tables)
 
 
-def _line_findings(system: Network, name: str) -> Iterator[Finding]:
-    """What is wrong with a line and its points, each under its own key of the system."""
+def _line_findings(network: Network, name: str) -> Iterator[Finding]:
+    """What is wrong with a line and its points, each under its own key of the network."""
     wrong: dict[Finding, None] = {}  # each once
-    for carrying in ((), *((key,) for key in system.carried(name))):
-        found = contradictions_of(system, name, carrying)
+    for carrying in ((), *((key,) for key in network.carried(name))):
+        found = contradictions_of(network, name, carrying)
         if not found:
-            wrong |= dict.fromkeys(motion_findings(vars(system.scene_of(name, carrying))))
+            wrong |= dict.fromkeys(motion_findings(vars(network.scene_of(name, carrying))))
         # of an end that nothing holds the first shape is not judged: the other lines at its point hold it
         wrong |= dict.fromkeys(x for x in found if not (carrying and x.at[:1] == ("initial",)))
         if wrong:
             break
-    yield from (_of_system(system, name, found) for found in wrong)
+    yield from (_of_network(network, name, found) for found in wrong)
 
 
-def _in_a_plane(system: Network) -> Iterator[Finding]:
+def _in_a_plane(network: Network) -> Iterator[Finding]:
     """What leaves the plane of all lines."""
-    scenes = {name: system.scene_of(name, system.carried(name)) for name in system.lines if system.dimension == 2}
+    scenes = {name: network.scene_of(name, network.carried(name)) for name in network.lines if network.dimension == 2}
     tables = [(x.environment, x.ends, x.initial) for x in scenes.values()]
     found = {
-        _of_system(system, name, each): None
+        _of_network(network, name, each): None
         for name, x in scenes.items()
         for each in plane_of(x.environment, x.cable, x.ends, x.initial, TYPED, tables)[1]
     }
     yield from found
 
 
-def _of_system(system: Network, name: str, found: Finding) -> Finding:
-    line, at = system.lines[name], found.at
+def _of_network(network: Network, name: str, found: Finding) -> Finding:
+    line, at = network.lines[name], found.at
     if at[:1] == ("obstacles",):  # which are those of all lines
-        carried = len(at) > 1 and at[1] in system.shaped
+        carried = len(at) > 1 and at[1] in network.shaped
         return replace(found, at=("bodies", at[1], "shape", *at[2:])) if carried else found
     if at[:1] == ("cable",):
         at = ("lines", name, *at[1:])
@@ -256,10 +256,10 @@ def _of_system(system: Network, name: str, found: Finding) -> Finding:
         if rest[:1] == ("tangent",):
             at = ("lines", name, "connections", str(at[1]), *rest)
             return Finding(at, found.expected, found.fix, found.given)
-        if isinstance(system.points[point], FreePoint) and rest:
+        if isinstance(network.points[point], FreePoint) and rest:
             rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
         at = ("points", point, *rest)
-        if isinstance(found_point := system.points[point], Fairlead):
+        if isinstance(found_point := network.points[point], Fairlead):
             moved = rest[:1] == ("motion",)
             at = ("bodies", found_point.body, *rest) if moved else ("points", point, "place")
     given = f"of line {name}: {found.given}" if found.given else None
@@ -277,44 +277,44 @@ def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Itera
 # --- how the ends of lines are connected ---------------------------------------------------------
 
 
-def connection_findings(system: Network) -> Iterator[Finding]:
-    """What is wrong with the connections of a system of lines."""
-    for name in system.lines:
+def connection_findings(network: Network) -> Iterator[Finding]:
+    """What is wrong with the connections of a network of lines."""
+    for name in network.lines:
         for key in ("start", "end"):
-            held = system.clamp(name, key)
+            held = network.clamp(name, key)
             if held is not None:
-                yield from _clamp_findings(system, name, key, held)
-            payout = getattr(system.lines[name].connections, key).payout
-            if payout is not None and isinstance(system.points[getattr(system.lines[name], key)], FreePoint):
+                yield from _clamp_findings(network, name, key, held)
+            payout = getattr(network.lines[name].connections, key).payout
+            if payout is not None and isinstance(network.points[getattr(network.lines[name], key)], FreePoint):
                 fix = "make the point `kind: fixed`, or the fairlead of a body"
                 expected = "nothing, because a winch stands on a fixed point or on a body"
                 yield Finding(("lines", name, "connections", key, "payout"), expected, fix)
-    for name, point in system.points.items():
-        if isinstance(point, FixedPoint) and point.motion is not None and not system.clamped_at(name):
+    for name, point in network.points.items():
+        if isinstance(point, FixedPoint) and point.motion is not None and not network.clamped_at(name):
             for turn in (x for x in point.motion.harmonics() if x in TURNS):
                 fix = "leave it out, or clamp a line there: `connections: {end: {tangent: [0, 0, 1]}}`"
                 expected = "no rotation, because lines turn freely at a point"
                 yield Finding(("points", name, "motion", turn), expected, fix)
         elif isinstance(point, FreePoint):
-            yield from _rigid_point_findings(system, name)
+            yield from _rigid_point_findings(network, name)
 
 
-def _clamp_findings(system: Network, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
-    line, point = system.lines[name], getattr(system.lines[name], key)
+def _clamp_findings(network: Network, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
+    line, point = network.lines[name], getattr(network.lines[name], key)
     at = ("lines", name, "connections", key)
-    stays = system.is_held(point) or isinstance(system.points[point], GuidedPoint)
+    stays = network.is_held(point) or isinstance(network.points[point], GuidedPoint)
     if not (stays or holds_rod(line.chosen_model, key, line.cable.length)):
         expected = "pinned, because this end of the line is a catenary, which has no moment"
         yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
-    if held.tangent is None and not isinstance(system.points[point], FreePoint):
+    if held.tangent is None and not isinstance(network.points[point], FreePoint):
         yield Finding((*at, "tangent"), "the direction of the line at this end", "add `tangent: [0, 0, 1]`", "nothing")
 
 
-def _rigid_point_findings(system: Network, name: str) -> Iterator[Finding]:
+def _rigid_point_findings(network: Network, name: str) -> Iterator[Finding]:
     """What is wrong with lines that are clamped to a free point."""
-    here, point = system.clamped_at(name), system.points[name]
+    here, point = network.clamped_at(name), network.points[name]
     if not here:
-        takes = system.is_free_end(name) and isinstance(point, FreePoint) and not point.is_body
+        takes = network.is_free_end(name) and isinstance(point, FreePoint) and not point.is_body
         if isinstance(point, FreePoint) and point.moment is not None and not takes:
             expected = "nothing, because all lines turn freely at this point: nothing there takes a moment"
             fix = "leave it out, or clamp two lines there: `connections: {end: clamped}` of one, `{start: clamped}`"
@@ -322,7 +322,7 @@ def _rigid_point_findings(system: Network, name: str) -> Iterator[Finding]:
         return
     line, key = here[0]
     at = ("lines", line, "connections", key)
-    held = [system.clamp(*x) for x in here]
+    held = [network.clamp(*x) for x in here]
     if len(here) == 1:
         expected = f"another line that is clamped at point {name}, because a free point alone holds no direction"
         yield Finding(at, expected, "clamp a second line there, or none, or make the point `kind: guided`", "one line")
@@ -340,21 +340,21 @@ def _rigid_point_findings(system: Network, name: str) -> Iterator[Finding]:
 # --- how far points that are held may be from each other -----------------------------------------
 
 
-def travel_findings(system: Network) -> Iterator[Finding]:
+def travel_findings(network: Network) -> Iterator[Finding]:
     """Points that are, or move, farther from another than all lines between them are long, at the utmost strain."""
     # what is broken reaches anywhere
-    duration = system.time.duration if system.time is not None and not system.may_break else 0.0
-    placed = {name: system.first_place(name) for name in system.points if system.is_held(name)}
-    motions = {name: _motion(system, name) for name in placed}
-    beside = _neighbours(system)
+    duration = network.time.duration if network.time is not None and not network.may_break else 0.0
+    placed = {name: network.first_place(name) for name in network.points if network.is_held(name)}
+    motions = {name: _motion(network, name) for name in placed}
+    beside = _neighbours(network)
     for name, other, reach, between in _held_pairs(placed, motions, beside):
-        if not between or _beside(system, name, other):
+        if not between or _beside(network, name, other):
             continue
         most = reach * (1.0 + SAME_LENGTH)
         distance, t = farthest((placed[name], placed[other]), (motions[name], motions[other]), duration, most)
         if distance <= most:
             continue
-        motion, long = motions[name], sum(system.lines[x].cable.length for x in between)
+        motion, long = motions[name], sum(network.lines[x].cable.length for x in between)
         lines = f"line {between[0]}" if len(between) == 1 else f"lines {', '.join(reversed(between))}"
         expected = f"at most {reach:.8g} m from point {other}, as far as {lines} of {long:.8g} m may reach (max_strain)"
         key = moving_key(motion) if motion is not None and t > 0.0 else ""
@@ -369,16 +369,16 @@ def travel_findings(system: Network) -> Iterator[Finding]:
         return
 
 
-def _motion(system: Network, name: str) -> Motion | None:
+def _motion(network: Network, name: str) -> Motion | None:
     """The motion of a fixed point, if tables move it."""
-    point = system.points[name]
+    point = network.points[name]
     motion = point.motion if isinstance(point, FixedPoint) else None
     return motion if motion is not None and moving_key(motion) else None
 
 
-def _beside(system: Network, a: str, b: str) -> bool:
+def _beside(network: Network, a: str, b: str) -> bool:
     """Whether a point is on a body that moves as is known, whose motion is not followed here."""
-    bodies = [system.body_of(x) for x in (a, b)]
+    bodies = [network.body_of(x) for x in (a, b)]
     return any(isinstance(x, FixedBody) and x.motion is not None for x in bodies)
 
 
@@ -386,18 +386,18 @@ def _beside(system: Network, a: str, b: str) -> bool:
 Neighbours = Mapping[str, list[tuple[str, float, tuple[str, ...]]]]
 
 
-def _neighbours(system: Network) -> Neighbours:
+def _neighbours(network: Network) -> Neighbours:
     """Points beside each point, along a line or on the same free body."""
-    beside: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in system.points}
-    for key, line in system.lines.items():
+    beside: dict[str, list[tuple[str, float, tuple[str, ...]]]] = {name: [] for name in network.points}
+    for key, line in network.lines.items():
         if line.connections.start.payout is not None or line.connections.end.payout is not None:
             continue
         far = line.cable.length if line.cable.inextensible else line.cable.reach
         beside[line.start].append((line.end, far, (key,)))
         beside[line.end].append((line.start, far, (key,)))
     on: dict[str, list[tuple[str, Fairlead]]] = {}
-    for name, x in system.points.items():
-        if isinstance(x, Fairlead) and system.is_joined(name):
+    for name, x in network.points.items():
+        if isinstance(x, Fairlead) and network.is_joined(name):
             on.setdefault(x.body, []).append((name, x))
     for same in on.values():
         for (a, one), (b, two) in combinations(same, 2):

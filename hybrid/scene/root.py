@@ -57,12 +57,14 @@ OF_PLACES = ("points", "history")
 POINTS: dict[str, tuple[str, dict[str, str], tuple[str, ...]]] = {
     "pinned": ("fixed", {"release_at": "break_at"}, ("payout",)),
     "clamped": (
-        "fixed", {"release_at": "break_at"}, ("tangent", "normal", "turns", "swivel", "bend_stiffness", "payout"),
+        "fixed",
+        {"release_at": "break_at"},
+        ("tangent", "normal", "turns", "swivel", "bend_stiffness", "payout"),
     ),
     "guided": ("guided", {}, ("tangent", "normal", "turns")),
     "free": ("free", {}, ()),
     "body": ("free", {"thrust": "force"}, ()),
-}  # fmt: skip
+}
 
 # What networks say of points, and what is said of ends.
 WORDS = {
@@ -146,9 +148,10 @@ def network_tables(scene: CableScene) -> dict[str, Any]:
     if "model" in scene.model_fields_set or not isinstance(scene.model, CatenaryModel):
         line["model"] = scene.model  # else a catenary stands for none, and is a rod where it goes slack
     tables: dict[str, Any] = {
-        "points": {name: point for name, (point, _) in made.items()}, "lines": {LINE: line},
+        "points": {name: point for name, (point, _) in made.items()},
+        "lines": {LINE: line},
         "output": _output(scene.output),
-    }  # fmt: skip
+    }
     return tables | {name: getattr(scene, name) for name in SAME if getattr(scene, name) is not None}
 
 

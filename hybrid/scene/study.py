@@ -156,11 +156,12 @@ class Kept(Table):
         | None
     ) = Field(default=None, description="arc length, or several; absent: the worst along the line [m]")
     take: Annotated[tuple[Literal[TAKES], ...], Field(min_length=1)] = Field(  # type: ignore[valid-type]
-        default=("max",), description="what of its history: max, min, mean, median, deviation (standard deviation), "
+        default=("max",),
+        description="what of its history: max, min, mean, median, deviation (standard deviation), "
         "skewness, period, significant, extreme (most probable maximum, MPM, in `hours`), fractile (P90 of that "
         "maximum), damage, exceedance (part of the time above `above`, or below `below`), utilisation (part of "
-        "max_tension or of min_bend_radius that is used), history, profile (max along s)"
-    )  # fmt: skip
+        "max_tension or of min_bend_radius that is used), history, profile (max along s)",
+    )
     times: tuple[Number, Number] | None = Field(default=None, description="only from one time to another [s]")
     hours: Positive = Field(default=3.0, description="of extreme and fractile [h]")
     above: Number | None = Field(default=None, description="of exceedance: the value, in the unit of the quantity")
@@ -204,9 +205,10 @@ class Study(Table):
     )
     sample: Sample | None = Field(default=None, description="a sample of the variables that have low and high")
     cases: Text | None = Field(
-        default=None, description="CSV file of cases, relative to the study file; its columns are keys of the scene or "
+        default=None,
+        description="CSV file of cases, relative to the study file; its columns are keys of the scene or "
         "names of variables in `vary` without values",
-    )  # fmt: skip
+    )
     carry: tuple[Text, ...] = Field(
         default=(),
         description="columns of the table of cases that are no keys, such as probabilities: kept beside the results",
@@ -400,9 +402,10 @@ class Measured(Table):
         default=None, description="in place of a column s: arc length, start or end, where all of it was measured [m]"
     )
     deviation: Positive | None = Field(
-        default=None, description="standard deviation of what was measured, in its unit; absent: by how much it "
+        default=None,
+        description="standard deviation of what was measured, in its unit; absent: by how much it "
         "scatters about what is found",
-    )  # fmt: skip
+    )
     deviations: dict[str, Positive] = Field(
         default_factory=dict, description="the same of columns, by name, where they have others"
     )

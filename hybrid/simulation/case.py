@@ -19,7 +19,7 @@ from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.network import NetworkResolution, build_system
+from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.plan import with_models
 from hybrid.model.resolution import (
@@ -479,7 +479,7 @@ class Case:
             if lines.keys() == resolution.lines.keys() and all(lines[x] is y for x, y in resolution.lines.items()):
                 return kept[2]
         with at_once(self.interrupted):
-            return start_of(network, build_system(network, resolution), self.moves, self.criterion)
+            return start_of(network, build_network(network, resolution), self.moves, self.criterion)
 
     def first_shapes(self, resolution: NetworkResolution) -> dict[str, tuple[Model, State]]:
         """Models and first states of a run, by line; they are kept for that of this resolution, if it comes next."""

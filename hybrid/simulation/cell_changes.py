@@ -138,10 +138,12 @@ class CellChanges(Remesh):
     def _kinds_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
         to, model = 1 - k, self.model
         return {
-            "cable": model.line_maker.cable, "base_of_cell": self._layout(to, m).of,
-            "kinds": self._zones_on(to, m).kinds, "floor_part": TENSION_FLOOR,
+            "cable": model.line_maker.cable,
+            "base_of_cell": self._layout(to, m).of,
+            "kinds": self._zones_on(to, m).kinds,
+            "floor_part": TENSION_FLOOR,
             "least": LEAST_TENSION * self._switching.manager.scale,
-        }  # fmt: skip
+        }
 
     def _switch_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         to, switching = 1 - k, self._switching
@@ -177,10 +179,12 @@ class CellChanges(Remesh):
         self._along: dict[str, Any] = {
             "borne": 1.0 + model.cable.max_strain[self._piece],
             "widths": np.ascontiguousarray(model.cable.outer_diameter[self._piece]),
-            "start": envelope.start, "envelope_s": envelope.s, "bounds": envelope.bounds,
+            "start": envelope.start,
+            "envelope_s": envelope.s,
+            "bounds": envelope.bounds,
             "stays": np.zeros(self.most + 1, np.int64),
             "spare": np.zeros(4 * b.EXTREMES * (self.most + 1 + extra)),
-        }  # fmt: skip
+        }
         of_line = shaped(blank_line_job, self._line_job, *PAIRS)
         self._fill = of_line[2], of_line[0]  # by the side that the line is on
         tables = [

@@ -58,7 +58,7 @@ FAR = 3.0
 class _Asked(NamedTuple):
     """What an equilibrium is sought of, with the loads of t (s); rubs: whether friction acts; begin: as of `starts`."""
 
-    system: Network
+    network: Network
     model: NetworkModel
     t: float
     bodies: Floats
@@ -72,23 +72,23 @@ class _Asked(NamedTuple):
 
     def starts(self) -> Iterator[Start]:
         """Shapes from which the equilibrium is looked for: `begin` alone, where that is given."""
-        model, system = self.model, self.system
+        model, network = self.model, self.network
         if self.begin is not None:
             yield self.begin
             return
         yield _first_shapes(model)
         if len(model.places) + len(model.body_places):
-            system = system.searched()
-            places = balanced_places(system, model)
+            network = network.searched()
+            places = balanced_places(network, model)
             if places is not None:
-                yield "lines hung between places that balance", NetworkState(*starts_between(system, *places, model))
+                yield "lines hung between places that balance", NetworkState(*starts_between(network, *places, model))
 
     def elsewhere(self) -> Iterator[Start]:
         """Shapes between other places, the same at every call, then the equilibrium of lines that may be slack.
 
         None where nothing is free.
         """
-        model, system = self.model, self.system.searched()
+        model, network = self.model, self.network.searched()
         if not len(model.places) + len(model.body_places):
             return
         chance, reach = np.random.default_rng(0), ELSEWHERE * min(x.length for x in model.models)
@@ -96,7 +96,7 @@ class _Asked(NamedTuple):
             places, bodies = model.places.copy(), model.body_places.copy()
             for row in (*places, *bodies[:, PLACE:FRAME]):
                 row += reach * chance.uniform(-1.0, 1.0, 3)
-            yield "lines hung between other places", NetworkState(*starts_between(system, places, bodies, model))
+            yield "lines hung between other places", NetworkState(*starts_between(network, places, bodies, model))
         with suppress(LineFailed):
             group = group_of(model, self.t, self.bodies)
             group = group._replace(lines=[_without_bending(x) for x in group.lines])
@@ -106,16 +106,16 @@ class _Asked(NamedTuple):
             yield "the equilibrium without bending, slack or not", found
 
 
-def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
+def equilibrium_of(network: Network, model: NetworkModel, t: float, friction: bool = True) -> LinesAtRest:
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found.
 
     friction: whether it settles on the bed, of lines that ask for that.
     """
-    if floating := [Complaint(dotted(x.at), str(x.given), x.expected, x.fix) for x in floating_groups(system)]:
+    if floating := [Complaint(dotted(x.at), str(x.given), x.expected, x.fix) for x in floating_groups(network)]:
         raise SceneError(floating)
 
     def search(_: Sequence[int], own: NetworkModel) -> LinesAtRest:
-        asked = _Asked(_network_of(system, own.names), own, t, own.body_numbers(t), friction)
+        asked = _Asked(_network_of(network, own.names), own, t, own.body_numbers(t), friction)
         try:
             return _in_its_water(asked)
         except LineFailed:
@@ -127,7 +127,7 @@ def equilibrium_of(system: Network, model: NetworkModel, t: float, friction: boo
     try:
         return _by_parts(model, t, _parts_of(model), search)
     except LineFailed as failed:
-        raise named(_with_reasons(failed, model), model, _nearer(system)) from None
+        raise named(_with_reasons(failed, model), model, _nearer(network)) from None
 
 
 def solve_from(
@@ -197,14 +197,14 @@ def _parts_of(model: NetworkModel) -> list[tuple[int, ...]]:
     return [*((k,) for k in lines if k not in others), *([others] if others else [])]
 
 
-def _network_of(system: Network, names: Sequence[str]) -> Network:
+def _network_of(network: Network, names: Sequence[str]) -> Network:
     """A network of some of the lines of another, with their points."""
-    if len(names) == len(system.lines):
-        return system
-    lines = {name: system.lines[name] for name in names}
+    if len(names) == len(network.lines):
+        return network
+    lines = {name: network.lines[name] for name in names}
     at = {point for line in lines.values() for point in (line.start, line.end)}
-    points = {name: x for name, x in system.points.items() if name in at}
-    return system.model_copy(update={"lines": lines, "points": points})
+    points = {name: x for name, x in network.points.items() if name in at}
+    return network.model_copy(update={"lines": lines, "points": points})
 
 
 def _model_of(model: NetworkModel, part: Sequence[int]) -> NetworkModel:
@@ -581,18 +581,18 @@ def lost_turns(network: NetworkModel, t: float, k: int, state: State, keeps_link
 # --- what is said where none is found -------------------------------------------------------------------
 
 
-def _nearer(system: Network) -> str:
+def _nearer(network: Network) -> str:
     """What to try first where a point is looked for farther away than a line to a held point reaches; else empty."""
     worst, text = FAR, ""
-    for name, place in system.guesses.items():
-        for line, end in system.lines_at(name):
-            other = system.lines[line].end if end == "start" else system.lines[line].start
-            if not system.is_held(other):
+    for name, place in network.guesses.items():
+        for line, end in network.lines_at(name):
+            other = network.lines[line].end if end == "start" else network.lines[line].start
+            if not network.is_held(other):
                 continue
-            length = sum(section.length for section in system.lines[line].sections)
-            away = math.dist(place, system.first_place(other))
+            length = sum(section.length for section in network.lines[line].sections)
+            away = math.dist(place, network.first_place(other))
             if away > worst * length:
-                point, worst = system.points[name], away / length
+                point, worst = network.points[name], away / length
                 key = f"bodies.{point.body}" if isinstance(point, Fairlead) else f"points.{name}"
                 text = (
                     f"{key}.initial_guess nearer: {away:.6g} m from points.{other}, line {line} is {length:.6g} m long"

@@ -29,7 +29,7 @@ from hybrid.kernels.state.report import (
     STRAND,
 )
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.network import NetworkModel, build_network
 from hybrid.outputs.probes import elevation
 from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.network import Network
@@ -64,12 +64,12 @@ class FloatingWatch(Part):
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """That has been said.  ValueError: it has names that the run does not have."""
-        dry, under, overlaps, system = saved["dry"], saved["under"], saved["overlaps"], self._run.network
-        if not (isinstance(dry, list) and set(dry) <= set(system.bodies)):
+        dry, under, overlaps, network = saved["dry"], saved["under"], saved["overlaps"], self._run.network
+        if not (isinstance(dry, list) and set(dry) <= set(network.bodies)):
             raise ValueError("dry: names of bodies were expected")
         if not (isinstance(overlaps, list) and all(isinstance(x, str) for x in overlaps)):
             raise ValueError("overlaps: what is in each other was expected")
-        if not (isinstance(under, dict) and set(under) <= set(system.points)):
+        if not (isinstance(under, dict) and set(under) <= set(network.points)):
             raise ValueError("under: names of points were expected")
         self.dry, self.overlaps = set(dry), set(overlaps)
         self.under = {name: float(depth) for name, depth in under.items()}
@@ -86,12 +86,12 @@ class FloatingWatch(Part):
 
     def _note_dry_bodies(self, seen: Sampled) -> None:
         """An event where a body that counts as submerged has risen out of the water."""
-        system = self._run.network
-        fluid = system.environment.fluid
+        network = self._run.network
+        fluid = network.environment.fluid
         if fluid is None or fluid.surface is None:
             return
         for k, body in enumerate(self._run.model.bodies):
-            given = system.free_bodies[body.name]
+            given = network.free_bodies[body.name]
             if not given.volume or body.name in self.dry:
                 continue
             arm = times(seen.frame(k), np.array(given.centre_of_buoyancy, float))
@@ -105,15 +105,15 @@ class FloatingWatch(Part):
 
     def _note_pulled_under(self, seen: Sampled) -> None:
         """An event where a point that floats by itself is wholly below the surface, and where it is much deeper."""
-        system, model = self._run.network, self._run.model
-        fluid = system.environment.fluid
+        network, model = self._run.network, self._run.model
+        fluid = network.environment.fluid
         if fluid is None or fluid.surface is None:
             return
         level = fluid.surface
-        for name in _floating(system, level):
-            point = system.points[name]
+        for name in _floating(network, level):
+            point = network.points[name]
             assert isinstance(point, FreePoint)
-            r, pull = _held(system, model, seen, name)
+            r, pull = _held(network, model, seen, name)
             now, sea = seen.lines[0].sea_now, model.models[0].sea.values
             waves = np.diagonal(elevation(sea, r[:, :2], now)) if self._moves else 0.0
             height = _height(point)
@@ -122,11 +122,11 @@ class FloatingWatch(Part):
                 if name in self.under and depth[k] <= DEEPER * self.under[name]:
                     continue
                 text = f"point {name}: its top is {depth[k]:.3g} m below the surface, although it floats by itself"
-                text += f": its buoyancy less its weight is {_net(system, point):.4g} N at most"
+                text += f": its buoyancy less its weight is {_net(network, point):.4g} N at most"
                 if self._moves:
                     text += f", and its lines pull it down by {pull[k]:.4g} N"
                 else:
-                    text += _at_surface(system, point, name, r[k], level - 0.5 * height)
+                    text += _at_surface(network, point, name, r[k], level - 0.5 * height)
                 self._event(seen.t[k], "pulled under", text)
                 self.under[name] = float(depth[k])
 
@@ -162,15 +162,15 @@ class FloatingWatch(Part):
                 raise LineFailed(-1, Outcome.LEFT_PLANE, run.t, None, f"{names[k]} leaves it")
 
 
-def _floating(system: Network, level: float) -> list[str]:
+def _floating(network: Network, level: float) -> list[str]:
     """Names of the points that are more buoyant than heavy, and are to float at a level (m).
 
     They have a height, which nothing but the surface asks for, or are first put at the surface; a buoy that is moored
     in the depth has and is neither.
     """
     found = []
-    for name, point in system.points.items():
-        if isinstance(point, FreePoint) and point.volume and _net(system, point) > 0.0:
+    for name, point in network.points.items():
+        if isinstance(point, FreePoint) and point.volume and _net(network, point) > 0.0:
             place = point.initial_guess
             top = -math.inf if place is None else place[2] + 0.5 * _height(point)
             if point.height is not None or top >= level:
@@ -183,17 +183,17 @@ def _height(point: FreePoint) -> float:
     return point.height or sphere_diameter(point.volume)
 
 
-def _net(system: Network, point: FreePoint) -> float:
+def _net(network: Network, point: FreePoint) -> float:
     """Buoyancy of its whole volume less its weight, N."""
-    fluid = system.environment.fluid
+    fluid = network.environment.fluid
     assert fluid is not None
-    return system.environment.gravity * (fluid.density * point.volume - point.mass)
+    return network.environment.gravity * (fluid.density * point.volume - point.mass)
 
 
-def _held(system: Network, model: NetworkModel, seen: Sampled, name: str) -> tuple[Floats, Floats]:
+def _held(network: Network, model: NetworkModel, seen: Sampled, name: str) -> tuple[Floats, Floats]:
     """Places (nb, 3) m of a point, and by how much its lines pull it down (nb,) N."""
     pull, place = np.zeros(len(seen.t)), np.zeros((len(seen.t), 3))
-    for line, end in system.lines_at(name):
+    for line, end in network.lines_at(name):
         k, last = model.names.index(line), end == "end"
         if (k, int(last)) in model.loose:
             continue
@@ -204,15 +204,15 @@ def _held(system: Network, model: NetworkModel, seen: Sampled, name: str) -> tup
     return place, pull
 
 
-def _at_surface(system: Network, point: FreePoint, name: str, place: Floats, z: float) -> str:
+def _at_surface(network: Network, point: FreePoint, name: str, place: Floats, z: float) -> str:
     """What the lines would pull of a point at rest that just floats, at a height z (m), and what would bear them."""
-    fluid = system.environment.fluid
+    fluid = network.environment.fluid
     assert fluid is not None
     held = FixedPoint(position=(float(place[0]), float(place[1]), z))
-    fixed = system.model_copy(update={"points": {**system.points, name: held}})
+    fixed = network.model_copy(update={"points": {**network.points, name: held}})
 
     try:
-        model = build_system(fixed)
+        model = build_network(fixed)
         found = equilibrium_of(fixed, model, np.inf, friction=False)
     except (ComputationError, SceneError, ValueError):  # ValueError: lines that do not reach so far make no scene
         return ", and its lines pull it down by as much"
@@ -221,7 +221,7 @@ def _at_surface(system: Network, point: FreePoint, name: str, place: Floats, z: 
         state, last = found.state.lines[model.names.index(line)], end == "end"
         up = float(state.T[-int(last)] * state.e[-int(last), 2] / np.linalg.norm(state.e[-int(last)]))
         pull += up if last else -up
-    volume = (pull / system.environment.gravity + point.mass) / fluid.density if system.environment.gravity else 0.0
+    volume = (pull / network.environment.gravity + point.mass) / fluid.density if network.environment.gravity else 0.0
     text = f", and its lines would pull it down by {pull:.4g} N at the surface"
     return text + (f": a volume of {volume:.3g} m^3 would float them" if volume > point.volume else "")
 

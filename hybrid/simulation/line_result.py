@@ -1,4 +1,4 @@
-"""One line of a system as a result: its outputs, its extremes and what is doubtful about it."""
+"""One line of a network as a result: its outputs, its extremes and what is doubtful about it."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ class LineResult:
     ) -> None:
         """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result.
 
-        turned: whether the system has moments at points.
+        turned: whether the network has moments at points.
         """
         line = self.model.line
         self.diagnostics.note_at_rest(found.pushed, slack_cell(x, state), state)

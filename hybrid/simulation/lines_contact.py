@@ -409,22 +409,22 @@ def pair_text(shared: SharedContact, model: NetworkModel) -> str:
 # --- lines between which no contact is computed -------------------------------------------------------
 
 
-def watched_pairs(system: Network, model: NetworkModel) -> list[tuple[int, int]]:
+def watched_pairs(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
     """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
     thick = [k for k, x in enumerate(model.models) if (diameters(x) > 0.0).all()]
     touching = model.touching
     return [(a, b) for a, b in combinations(thick, 2) if touching is None or b not in touching.partners(a)]
 
 
-def _joined_by_place(system: Network, width: float) -> NDArray[np.int64]:
+def _joined_by_place(network: Network, width: float) -> NDArray[np.int64]:
     """As joined_ends_of, but what is held or moved is one thing only where it is one place at first.
 
     width: m, the largest diameter.
     """
-    joined = joined_ends_of(system)
+    joined = joined_ends_of(network)
     held = np.argwhere(joined == 0)
-    lines = list(system.lines.values())
-    at = np.array([system.first_place((lines[k].start, lines[k].end)[end]) for k, end in held]).reshape(-1, 3)
+    lines = list(network.lines.values())
+    at = np.array([network.first_place((lines[k].start, lines[k].end)[end]) for k, end in held]).reshape(-1, 3)
     first = 1 + int(joined.max(initial=0))
     for row, place in zip(held, at, strict=True):  # the number of the first that is there
         beside = np.linalg.norm(at - place, axis=1) <= OUTER * width
@@ -436,18 +436,18 @@ class LinesWatch:
     """What looks after every step whether two of such lines have met, or are near."""
 
     def __init__(
-        self, system: Network, model: NetworkModel, met: set[tuple[int, int]], clock: Clock,
+        self, network: Network, model: NetworkModel, met: set[tuple[int, int]], clock: Clock,
         alone: Collection[tuple[int, int]] = (),
     ) -> None:  # fmt: skip
         """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""
         may = set(combinations(model.may_meet, 2)) - set(alone)
-        rows = [(*x, MET * (x in met), x in may, 0) for x in watched_pairs(system, model)]
+        rows = [(*x, MET * (x in met), x in may, 0) for x in watched_pairs(network, model)]
         self._pairs = np.array(rows, np.int64).reshape(-1, WATCHED)
         self._room = np.zeros((len(self._pairs), ROOM))
         width = [diameters(x) for x in model.models]
         begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
         widest = max((float(x.max()) for x in width), default=0.0)
-        self.joined = _joined_by_place(system, widest)
+        self.joined = _joined_by_place(network, widest)
         self._bound = {
             "joined": self.joined, "begins": begins, "width": np.concatenate(width),
             "clock": clock, "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
@@ -466,15 +466,15 @@ class LinesWatch:
         even, odd = self._jobs
         return even.numbers, odd.numbers, watch_lines.address(even.numbers)
 
-    def begin(self, system: Network) -> set[tuple[int, int]]:
+    def begin(self, network: Network) -> set[tuple[int, int]]:
         """Check the start, to which the jobs of even parity lead.
 
         Returns lines that meet at a point or body and lie in each other there, by a narrow angle: these are not
         reported.
         """
         watch_lines(self._jobs[0].numbers)
-        lines = list(system.lines.values())
-        ends = [{system.body_of(p) or p for p in (x.start, x.end)} for x in lines]
+        lines = list(network.lines.values())
+        ends = [{network.body_of(p) or p for p in (x.start, x.end)} for x in lines]
         return {(a, b) for a, b, *_ in self.met() if any(x is y or x == y for x in ends[a] for y in ends[b])}
 
     def met(self) -> list[tuple[int, int, float, float, float]]:

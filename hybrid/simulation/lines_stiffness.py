@@ -18,7 +18,7 @@ from hybrid.kernels.state.report import STIFFNESS as STIFFNESS_OF
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of, frame_of, seat_of, seated
 from hybrid.model.build import in_space
-from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.network import NetworkModel, build_network
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import nearest
 from hybrid.scene.bodies import BodyShape, FixedBody, FreeBody, HeldBody
@@ -46,7 +46,7 @@ LEAST_SPRING = 1e-3
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Linearised stiffness of a system at a point, or at the origin of a body, at the equilibrium.
+    """Linearised stiffness of a network at a point, or at the origin of a body, at the equilibrium.
 
     matrix: (3, 3) N/m of a point, (6, 6) N/m, N/rad, N m/m, N m/rad of a body: force and moment that it takes to shift
     and turn it, inertial axes; other points and bodies that are free follow.  lines: the part of the lines; that of a
@@ -89,16 +89,16 @@ def stiffness(scene: SceneLike, at: str) -> Stiffness:
         return _stiffness_at(asked, at)
 
 
-def _stiffness_at(system: Network, at: str) -> Stiffness:
+def _stiffness_at(network: Network, at: str) -> Stiffness:
     """The same of a network."""
-    kind, name = target_of(system, at)
-    model = build_system(system)
-    found = _equilibrium(system, model)
+    kind, name = target_of(network, at)
+    model = build_network(network)
+    found = _equilibrium(network, model)
     solver, state, first = found.solver, found.state, 0
     size = 6 if kind == "body" else 3
     free = [*model.free], [*(body.name for body in model.bodies), *model.rigid]
     if kind == "point" and name in free[0]:
-        first, position, rotation = 3 * free[0].index(name), _place(system, model, found, name), None
+        first, position, rotation = 3 * free[0].index(name), _place(network, model, found, name), None
         own = np.zeros((3, 3))
     elif kind == "point" and name in model.rigid:  # whose turns follow
         row = state.bodies[free[1].index(name)]
@@ -110,9 +110,9 @@ def _stiffness_at(system: Network, at: str) -> Stiffness:
         own, position = _own_stiffness(solver.bodies[b], row), row[PLACE:FRAME].copy()
         rotation = angles_of(row[FRAME:V].reshape(3, 3))
     else:
-        solver, state = _let_go(system, model, found, kind, name)
-        held = system.bodies[name] if kind == "body" else None
-        position = np.array(held.position) if isinstance(held, FixedBody) else _place(system, model, found, name)
+        solver, state = _let_go(network, model, found, kind, name)
+        held = network.bodies[name] if kind == "body" else None
+        position = np.array(held.position) if isinstance(held, FixedBody) else _place(network, model, found, name)
         rotation = np.array(held.rotation) if isinstance(held, FixedBody) else None
         first, own = 3 * len(free[0]) + (6 * len(free[1]) if kind == "body" else 0), np.zeros((size, size))
     matrix = _stiffness(solver, state, first, size, len(solver.net))
@@ -121,9 +121,9 @@ def _stiffness_at(system: Network, at: str) -> Stiffness:
     return Stiffness(at, matrix, np.asarray(matrix - own, float), position, rotation)
 
 
-def _equilibrium(system: Network, model: NetworkModel) -> LinesAtRest:
+def _equilibrium(network: Network, model: NetworkModel) -> LinesAtRest:
     """Under full loads, without friction.  SceneError: a line that contact is asked for is within itself in it."""
-    found = equilibrium_of(system, model, np.inf, friction=False)
+    found = equilibrium_of(network, model, np.inf, friction=False)
     if not found.settled:
         refuse_within_itself(model, found.solver.lines, found.state, moves=False)
     return found
@@ -248,22 +248,22 @@ def offsets(scene: SceneLike, at: str, distances: Sequence[float], heading: floa
         return _offsets_at(asked, at, distances, heading)
 
 
-def _offsets_at(system: Network, at: str, distances: Sequence[float], heading: float) -> Offsets:
+def _offsets_at(network: Network, at: str, distances: Sequence[float], heading: float) -> Offsets:
     """The same of a network."""
-    kind, name = target_of(system, at)
-    model = build_system(system)
-    found = _equilibrium(system, model)
-    shape = getattr(system.bodies[name], "shape", None) if kind == "body" else None
+    kind, name = target_of(network, at)
+    model = build_network(network)
+    found = _equilibrium(network, model)
+    shape = getattr(network.bodies[name], "shape", None) if kind == "body" else None
     if shape is not None:  # which lines may not pass on the way to where they touch it
-        system = system.model_copy(update={"lines": _from_where_they_lie(system, found)})
-    place = _place(system, model, found, name) if kind == "point" else None
-    rigid = kind == "point" and name in system.rigid
+        network = network.model_copy(update={"lines": _from_where_they_lie(network, found)})
+    place = _place(network, model, found, name) if kind == "point" else None
+    rigid = kind == "point" and name in network.rigid
     if rigid:
-        system = system.model_copy(update={"lines": _clamped_as_they_lie(system, model, found, name)})
+        network = network.model_copy(update={"lines": _clamped_as_they_lie(network, model, found, name)})
     free = [body.name for body in model.bodies]
     rotation = np.zeros(3)
     if kind == "body":
-        body = system.bodies[name]
+        body = network.bodies[name]
         if isinstance(body, FixedBody):
             place, rotation = np.array(body.position), np.array(body.rotation)
         else:
@@ -272,12 +272,12 @@ def _offsets_at(system: Network, at: str, distances: Sequence[float], heading: f
     assert place is not None
     along = np.array([np.cos(np.radians(heading)), np.sin(np.radians(heading)), 0.0])
     forces, moments, tensions = [], [], []
-    which = _points_of(system, kind, name)
+    which = _points_of(network, kind, name)
     for distance in distances:
         try:
-            moved = _held(system, kind, name, (place + distance * along, rotation), shape)
-            there = build_system(moved)
-            _make_as_hard(moved, there, system, model)
+            moved = _held(network, kind, name, (place + distance * along, rotation), shape)
+            there = build_network(moved)
+            _make_as_hard(moved, there, network, model)
             here = _equilibrium(moved, there)
         except SceneError as error:
             given = f"an offset of {distance:g} m"
@@ -307,10 +307,10 @@ def _offsets_at(system: Network, at: str, distances: Sequence[float], heading: f
     )  # fmt: skip
 
 
-def _largest_tension(found: LinesAtRest, model: NetworkModel, system: Network, l: int) -> float:
+def _largest_tension(found: LinesAtRest, model: NetworkModel, network: Network, l: int) -> float:
     """Of the cells of line l, and of its ends, where the force of what holds it is known, N."""
     state, report, line = found.state.lines[l], found.solver.work[l].report, model.models[l]
-    marks = marks_of(system.scene_of(model.names[l]), line)
+    marks = marks_of(network.scene_of(model.names[l]), line)
     d = state.e / np.linalg.norm(state.e, axis=1, keepdims=True)
     largest = float(state.T.max())
     for k in (0, 1):
@@ -321,42 +321,44 @@ def _largest_tension(found: LinesAtRest, model: NetworkModel, system: Network, l
     return largest
 
 
-def target_of(system: Network, at: str) -> tuple[str, str]:
+def target_of(network: Network, at: str) -> tuple[str, str]:
     """Kind and name of what is asked for, `point:NAME` or `body:NAME`; SceneError where the scene has no such one."""
     kind, _, name = at.partition(":")
-    if name not in (system.points if kind == "point" else system.bodies if kind == "body" else ()):
-        names = [f"point:{x}" for x, p in system.points.items() if not isinstance(p, Fairlead)]
-        names += [f"body:{x}" for x in system.bodies]
+    if name not in (network.points if kind == "point" else network.bodies if kind == "body" else ()):
+        names = [f"point:{x}" for x, p in network.points.items() if not isinstance(p, Fairlead)]
+        names += [f"body:{x}" for x in network.bodies]
         fix = nearest(at, dict.fromkeys(names, "")) or f"write {names[0]}"
         raise SceneError([Complaint("stiffness", at, f"one of {', '.join(names)}", fix)])
-    point = system.points.get(name) if kind == "point" else None
+    point = network.points.get(name) if kind == "point" else None
     if isinstance(point, Fairlead):
         expected = f"a point that is on no body; {name} is on body {point.body}"
         raise SceneError([Complaint("stiffness", at, expected, f"write body:{point.body}")])
     return kind, name
 
 
-def _ends(system: Network) -> list[tuple[str, str]]:
-    return [(x.start, x.end) for x in system.lines.values()]
+def _ends(network: Network) -> list[tuple[str, str]]:
+    return [(x.start, x.end) for x in network.lines.values()]
 
 
-def _points_of(system: Network, kind: str, name: str) -> list[str]:
+def _points_of(network: Network, kind: str, name: str) -> list[str]:
     if kind == "point":
         return [name]
-    return [p for p, point in system.points.items() if isinstance(point, Fairlead) and point.body == name]
+    return [p for p, point in network.points.items() if isinstance(point, Fairlead) and point.body == name]
 
 
-def _place(system: Network, model: NetworkModel, found: LinesAtRest, point: str) -> Floats:
+def _place(network: Network, model: NetworkModel, found: LinesAtRest, point: str) -> Floats:
     """Where a point is in an equilibrium."""
-    line, end = system.lines_at(point)[0]
+    line, end = network.lines_at(point)[0]
     return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
 
 
-def _clamped_as_they_lie(system: Network, model: NetworkModel, found: LinesAtRest, point: str) -> dict[str, JoinedLine]:
+def _clamped_as_they_lie(
+    network: Network, model: NetworkModel, found: LinesAtRest, point: str
+) -> dict[str, JoinedLine]:
     """The lines, with inertial directions of an equilibrium for those that are clamped to a free point."""
     axes = found.state.bodies[len(model.bodies) + model.rigid.index(point), FRAME:V].reshape(3, 3)
-    lines = dict(system.lines)
-    for name, end in system.clamped_at(point):
+    lines = dict(network.lines)
+    for name, end in network.clamped_at(point):
         tangent, normal = seated(model.seats[model.names.index(name), int(end == "end")], axes)
         connections = lines[name].connections
         held = getattr(connections, end).model_copy(update={"tangent": tangent, "normal": normal})
@@ -365,42 +367,42 @@ def _clamped_as_they_lie(system: Network, model: NetworkModel, found: LinesAtRes
     return lines
 
 
-def _from_where_they_lie(system: Network, found: LinesAtRest) -> dict[str, JoinedLine]:
+def _from_where_they_lie(network: Network, found: LinesAtRest) -> dict[str, JoinedLine]:
     """The lines, whose equilibria are searched for from that."""
     shapes = (tuple(map(tuple, x.r.tolist())) for x in found.state.lines)
     return {
         name: line.model_copy(update={"initial": Equilibrium(points=points)})
-        for (name, line), points in zip(system.lines.items(), shapes, strict=True)
+        for (name, line), points in zip(network.lines.items(), shapes, strict=True)
     }
 
 
-def _held(system: Network, kind: str, name: str, pose: tuple[Floats, Floats], shape: BodyShape | None) -> Network:
-    """The system with a point or body held somewhere; pose: place, m, and rotation, deg; shape: of the body."""
+def _held(network: Network, kind: str, name: str, pose: tuple[Floats, Floats], shape: BodyShape | None) -> Network:
+    """The network with a point or body held somewhere; pose: place, m, and rotation, deg; shape: of the body."""
     at, turned = (tuple(x.tolist()) for x in pose)
-    changed: dict[str, dict[str, Any]] = {"points": {**system.points, name: FixedPoint(position=at)}}
+    changed: dict[str, dict[str, Any]] = {"points": {**network.points, name: FixedPoint(position=at)}}
     if kind == "body":
-        changed = {"bodies": {**system.bodies, name: FixedBody(position=at, rotation=turned)}}
-        if not _points_of(system, kind, name):  # which no scene holds
+        changed = {"bodies": {**network.bodies, name: FixedBody(position=at, rotation=turned)}}
+        if not _points_of(network, kind, name):  # which no scene holds
             del changed["bodies"][name]
-    moved: Network = read_text(scene_text(system.model_copy(update=changed)))[0]  # so that lines too short are refused
+    moved: Network = read_text(scene_text(network.model_copy(update=changed)))[0]  # so that lines too short are refused
     if shape is None:
         return moved
     held = HeldBody(position=at, rotation=turned, shape=shape)
     return moved.model_copy(update={"bodies": {**moved.bodies, name: held}})
 
 
-def _make_as_hard(moved: Network, there: NetworkModel, system: Network, model: NetworkModel) -> None:
+def _make_as_hard(moved: Network, there: NetworkModel, network: Network, model: NetworkModel) -> None:
     """Let obstacles be as hard as they were with a body or point that presses lines on them, and is held now."""
-    before = list(system.surfaces)
+    before = list(network.surfaces)
     same = [before.index(x) for x in moved.surfaces]
     for new, old in zip(there.models, model.models, strict=True):
         new.sea.values.obstacles[:, STIFFNESS_OF] = old.sea.values.obstacles[same, STIFFNESS_OF]
 
 
-def _contact_on(found: LinesAtRest, system: Network, body: str, origin: Floats) -> tuple[Floats, Floats]:
+def _contact_on(found: LinesAtRest, network: Network, body: str, origin: Floats) -> tuple[Floats, Floats]:
     """Force (3,) N of lines that touch a body, and moment (3,) N m about its origin."""
-    force, moment, surfaces = np.zeros(3), np.zeros(3), list(system.surfaces)
-    if body not in surfaces or body in system.obstacles:
+    force, moment, surfaces = np.zeros(3), np.zeros(3), list(network.surfaces)
+    if body not in surfaces or body in network.obstacles:
         return force, moment
     at = EACH * surfaces.index(body) + FORCE_OF
     for x, state in zip(found.solver.lines, found.state.lines, strict=True):
@@ -413,20 +415,20 @@ def _contact_on(found: LinesAtRest, system: Network, body: str, origin: Floats) 
 
 
 def _let_go(
-    system: Network, model: NetworkModel, found: LinesAtRest, kind: str, name: str
+    network: Network, model: NetworkModel, found: LinesAtRest, kind: str, name: str
 ) -> tuple[NetworkSolver, NetworkState]:
     """The lines of an equilibrium as they are, with what is held at a point or body free to move."""
     points, bodies = len(model.free), found.solver.bodies
-    which = _points_of(system, kind, name)
+    which = _points_of(network, kind, name)
     numbers, rows = bodies, found.state.bodies
     if kind == "body":
-        body = system.bodies[name]
+        body = network.bodies[name]
         assert not isinstance(body, FreeBody)
         row = np.zeros(STATE)
         row[PLACE:FRAME], row[FRAME:V] = body.position, frame_of(body.rotation).ravel()
         numbers, rows = np.vstack([bodies, np.zeros(bodies.shape[1])]), np.vstack([rows, row])
     lines = []
-    for x, ends in zip(found.solver.lines, _ends(system), strict=True):
+    for x, ends in zip(found.solver.lines, _ends(network), strict=True):
         # a point that is let go is numbered between the free points and the bodies
         joints = [j + 1 if kind == "point" and j >= points else j for j in x.joints]
         held, fairleads, seats = x.ends.held.copy(), x.fairleads.copy(), x.seats.copy()
@@ -434,7 +436,7 @@ def _let_go(
             if point in which:
                 joints[k] = points if kind == "point" else points + len(bodies)
                 held[k] = JOINED
-                found_point = system.points[point]
+                found_point = network.points[point]
                 if isinstance(found_point, Fairlead):
                     fairleads[k] = found_point.place
                     if x.line.element[-k]:

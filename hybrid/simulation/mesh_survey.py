@@ -26,7 +26,7 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model, twist_rate
 from hybrid.model.mesh import AT_PLACE, DEFAULT_CELLS, GROWTH, LAYER, SAMPLES, Grading, grading, layers
-from hybrid.model.network import NetworkResolution, build_system
+from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import payout_of
 from hybrid.model.plan import Demand
 from hybrid.model.resolution import (
@@ -398,7 +398,7 @@ def rods_at_rest(network: Network, resolution: NetworkResolution, moves: bool) -
     from hybrid.simulation.equilibrium import equilibrium_of
 
     with at_once():
-        model = build_system(network, resolution=resolution)
+        model = build_network(network, resolution=resolution)
         states: Sequence[State] = [x.start for x in model.models]
         if not (moves and network.starts_as_placed):
             states = equilibrium_of(network, model, 0.0 if moves else np.inf).state.lines

@@ -46,7 +46,7 @@ EVERY_STEP = 1 << 40  # beside the bits of Counts.notices: of every step that Py
 
 
 class Sampled(NamedTuple):
-    """Outputs of a system: nb states of its lines and bodies."""
+    """Outputs of a network: nb states of its lines and bodies."""
 
     lines: Sequence[Batch]
     bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.network

@@ -395,9 +395,10 @@ class Remesh:
         (due, plan, keep), planners, at.room = self._planner()
         in_run, in_beside = of_run[0].places(IN_RUN), of_beside[0].places(self.beside)
         numbers: dict[str, Any] = {
-            "itself": np.zeros(0, np.int64), "itself_places": np.zeros(0, np.int64),
+            "itself": np.zeros(0, np.int64),
+            "itself_places": np.zeros(0, np.int64),
             "in_itself": np.zeros((2, 3, 0), np.int64),
-        }  # fmt: skip
+        }
         of_itself: list[Shaped] = []
         if self._watch_table is not None:
             of_itself = shaped(blank_itself_job, self._in_itself, *BOTH)

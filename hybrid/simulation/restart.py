@@ -36,7 +36,7 @@ from hybrid.model.contents import passing_each_other, self_reach
 from hybrid.model.ends import EndConditions
 from hybrid.model.failure import Weakness
 from hybrid.model.mesh import MOST_CELLS, Grading, Layout
-from hybrid.model.network import NetworkResolution, build_system
+from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sections import OutputPoints
@@ -298,18 +298,18 @@ def resolution_from(tree: Any, scene: LineScene) -> Resolution:
     return Resolution(**saved | {"grading": grading} | rows)
 
 
-def kept_resolution(system: Network, source: Path) -> NetworkResolution:
-    """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
+def kept_resolution(network: Network, source: Path) -> NetworkResolution:
+    """How finely a result was computed that has a checkpoint.  ResultError: it is none of this network."""
     with opened(source) as file:
         tree = read_checkpoint(file).resolution
-    first = NetworkResolution.first(system)
+    first = NetworkResolution.first(network)
     if not tree:  # of an earlier program
         return first
     with refused(source):
-        tree = {next(iter(system.lines)): tree} if is_of_cable(tree) else tree
-        if set(tree) != set(system.lines):
+        tree = {next(iter(network.lines)): tree} if is_of_cable(tree) else tree
+        if set(tree) != set(network.lines):
             raise ValueError("resolutions of other lines")
-        found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
+        found = {name: resolution_from(tree[name], network.scene_of(name)) for name in network.lines}
         if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
             raise ValueError("lines with other steps")
         return NetworkResolution(found)
@@ -336,10 +336,12 @@ def is_cut_off(source: Path, texts: tuple[str, str], resolution: NetworkResoluti
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
-    "environment.fluid.current", "environment.fluid.waves", "time.duration",
+    "environment.fluid.current",
+    "environment.fluid.waves",
+    "time.duration",
     *(f"ends.{end}.{key}" for end in ("start", "end") for key in ("motion", "force", "thrust", "moment")),
     *(f"{what}.NAME.{key}" for what in ("points", "bodies") for key in ("motion", "force", "moment")),
-)  # fmt: skip
+)
 # Of the length, and of the length in the time of a transverse wave: what an end may jump by, and its velocity.
 SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
 SAME_INTERVAL = 1e-9  # part of the interval of outputs: round-off
@@ -492,8 +494,8 @@ def _refuse_more_out(before: Any, after: Any, until: float) -> None:
 def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
     _check_what_changes(last, changed, begin, end)
-    old = build_system(last.scene, resolution)
-    new = build_system(changed, resolution, old)
+    old = build_network(last.scene, resolution)
+    new = build_network(changed, resolution, old)
     for name, one, other, joints in zip(old.names, old.models, new.models, old.joints, strict=True):
         other.ends.copy_frames(one.ends)
         for k, end_name in enumerate(("start", "end")):

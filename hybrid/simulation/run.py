@@ -17,7 +17,7 @@ from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import state_for
 from hybrid.model.failure import Weakness
-from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.network import NetworkModel, NetworkResolution, build_network
 from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.network import Network
@@ -440,7 +440,7 @@ class Run(RecordedRun):
 
 
 def new_run(
-    system: Network, target: Target | None, text: Text, moves: bool,
+    network: Network, target: Target | None, text: Text, moves: bool,
     resolution: NetworkResolution | None = None, recording: Recording = ALONE,
     criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
 ) -> Run:  # fmt: skip
@@ -449,50 +449,50 @@ def new_run(
     target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
     motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks for, or the
     checkpoint says; criterion: one more for zones that move (zones.criteria); changes: loads and motions of these
-    systems hold from some time on.
+    networks hold from some time on.
     """
-    end = (recording.until or system.require_time().duration) if moves else 0.0
-    changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
+    end = (recording.until or network.require_time().duration) if moves else 0.0
+    changes = [replace(x, scene=with_loads_of(network, x.scene)) for x in changes if x.t < end]
     if recording.source is None:
-        first = _at_start(system, resolution, recording.start, moves, criterion)
+        first = _at_start(network, resolution, recording.start, moves, criterion)
     else:
-        first = _at_checkpoint(system, recording.source, changes, criterion)
+        first = _at_checkpoint(network, recording.source, changes, criterion)
     kept = recording.mode.before is not None and isinstance(target, Path)
     run = Run(first, _steps(first, moves, end), target, criterion, kept)
     run.changes, run.notes, run.begun = changes, recording.notes, recording.begun
-    _equip(run, first, system, text, recording)
+    _equip(run, first, network, text, recording)
     run.recorder = run.file.begin() if recording.source is None else run.continue_file(recording.source)
     return run
 
 
 def _at_start(
-    system: Network, resolution: NetworkResolution | None, start: Start | None, moves: bool,
+    network: Network, resolution: NetworkResolution | None, start: Start | None, moves: bool,
     criterion: UserCriterion | None,
 ) -> First:  # fmt: skip
-    """The equilibrium of a system, or its lines as they are placed, unless its start is known."""
+    """The equilibrium of a network, or its lines as they are placed, unless its start is known."""
     if start is None:
-        start = start_of(system, build_system(system, resolution=resolution), moves, criterion)
+        start = start_of(network, build_network(network, resolution=resolution), moves, criterion)
     state = NetworkState([x.start for x in start.model.models], start.model.body_places)
     state = (state if start.found is None else start.found.state).copy()
-    scenes = system.scenes_of_lines
-    return First(system, start.model, state, start.found, start.managers, [*scenes.values()], 0, False)
+    scenes = network.scenes_of_lines
+    return First(network, start.model, state, start.found, start.managers, [*scenes.values()], 0, False)
 
 
 def _at_checkpoint(
-    system: Network, source: Path, changes: Sequence[LoadChange[Network]], criterion: UserCriterion | None
+    network: Network, source: Path, changes: Sequence[LoadChange[Network]], criterion: UserCriterion | None
 ) -> First:
-    """Blank states of the lines of a system, which is loaded as where the checkpoint of a result is."""
-    model = build_system(system, resolution=kept_resolution(system, source))
+    """Blank states of the lines of a network, which is loaded as where the checkpoint of a result is."""
+    model = build_network(network, resolution=kept_resolution(network, source))
     changed = kept_changes(source, len(changes))
-    scenes = system.scenes_of_lines
+    scenes = network.scenes_of_lines
     managers = managers_for(scenes, model, criterion)  # as at the start, whatever loads came later
     if changed:
-        system = changes[changed - 1].scene
-        model = loaded_as(model, system, 0.0)
+        network = changes[changed - 1].scene
+        model = loaded_as(model, network, 0.0)
     for k, x in managers.items():
         x.load(model.models[k].ends.moments)
     state = NetworkState([state_for(x.line) for x in model.models], np.zeros_like(model.body_places))
-    return First(system, model, state, None, managers, [*scenes.values()], changed, True)
+    return First(network, model, state, None, managers, [*scenes.values()], changed, True)
 
 
 def _steps(first: First, moves: bool, end: float) -> NetworkSteps:
@@ -511,8 +511,8 @@ def _steps(first: First, moves: bool, end: float) -> NetworkSteps:
     return NetworkSteps(first.network.require_time().rho_inf, [0.0, *times], *follow, turn)
 
 
-def _equip(run: Run, first: First, system: Network, text: Text, recording: Recording) -> None:
-    """Give a run its file, its lines and its parts; system: with the loads of its start."""
+def _equip(run: Run, first: First, network: Network, text: Text, recording: Recording) -> None:
+    """Give a run its file, its lines and its parts; network: with the loads of its start."""
     me = proxy(run)  # for parts: in a circle a run would wait for the search for garbage
     moves, named = run.moves, dict(zip(first.model.names, first.scenes, strict=True))
     parts: list[Part] = []
@@ -522,11 +522,11 @@ def _equip(run: Run, first: First, system: Network, text: Text, recording: Recor
 
         payout = RunPayout(me)
         parts.append(payout)
-    run.file = RunFile(me, system, named, text, recording)
+    run.file = RunFile(me, network, named, text, recording)
     _add_lines(run, first, recording, payout.lines if payout is not None else {})
     contact = RunContact(me, recording.touches, run.target is not None)
     if recording.planes and moves:
-        parts.append(LonePlanes(me, run.loop.counts, system.dimension == 2))
+        parts.append(LonePlanes(me, run.loop.counts, network.dimension == 2))
     shaken = zip(named.items(), run.resolution.lines.values(), strict=True)
     vibrations = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
     if moves:
@@ -567,20 +567,20 @@ def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, 
             line.diagnostics.begin()
 
 
-def start_of(system: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
-    """The first state of a system, with its zones; moves: whether a motion begins there, else it is at rest."""
-    scenes = system.scenes_of_lines
-    if moves and system.starts_as_placed:
+def start_of(network: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:
+    """The first state of a network, with its zones; moves: whether a motion begins there, else it is at rest."""
+    scenes = network.scenes_of_lines
+    if moves and network.starts_as_placed:
         model, managers = zones_as_placed(scenes, model, criterion)
         return Start(model, None, managers)
     with at_once():
-        return start_at_rest(system, scenes, model, moves, criterion)
+        return start_at_rest(network, scenes, model, moves, criterion)
 
 
-def static_system(
-    system: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None
+def static_network(
+    network: Network, target: Target | None, text: Text, resolution: NetworkResolution | None = None
 ) -> Run:
-    """Compute the equilibrium of a system under full loads; the rest: as of `new_run`."""
-    run = new_run(system, target, text, False, resolution)
+    """Compute the equilibrium of a network under full loads; the rest: as of `new_run`."""
+    run = new_run(network, target, text, False, resolution)
     run.record_equilibrium()
     return run

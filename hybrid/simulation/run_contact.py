@@ -42,17 +42,17 @@ BEGINS, GIVEN_UP = "contact begins", "contact given up"
 
 
 def refuse_within_itself(
-    system: NetworkModel, lines: Sequence[JoinedLine], state: NetworkState, moves: bool, where: str = WITHOUT_CONTACT
+    network: NetworkModel, lines: Sequence[JoinedLine], state: NetworkState, moves: bool, where: str = WITHOUT_CONTACT
 ) -> None:
     """SceneError: a line for which contact is asked is within itself at the start; where: what that is.
 
     In an equilibrium without contact so is every start from which a damped motion with contact could lead to another.
     moves: whether a motion begins there, which may begin in contact; an equilibrium alone must be apart.
     """
-    if system.touching is not None:
-        _refuse_within_others(system, lines, state, moves, where)
-    for k, (name, model, x, one) in enumerate(zip(system.names, system.models, lines, state.lines, strict=True)):
-        if not touches_alone(system, k):
+    if network.touching is not None:
+        _refuse_within_others(network, lines, state, moves, where)
+    for k, (name, model, x, one) in enumerate(zip(network.names, network.models, lines, state.lines, strict=True)):
+        if not touches_alone(network, k):
             continue
         contact = contact_of(model)
         energy = contact.energy_of(x.line, x.ends, one)
@@ -71,13 +71,13 @@ def refuse_within_itself(
 
 
 def _refuse_within_others(
-    system: NetworkModel, lines: Sequence[JoinedLine], state: NetworkState, moves: bool, where: str
+    network: NetworkModel, lines: Sequence[JoinedLine], state: NetworkState, moves: bool, where: str
 ) -> None:
     """The same of lines that touch each other."""
-    energy, shared = energy_between(system, lines, system.body_numbers(0.0), state)
+    energy, shared = energy_between(network, lines, network.body_numbers(0.0), state)
     if energy == 0.0 or (moves and math.isfinite(energy)):
         return
-    given = f"and {where}, {pair_text(shared, system)}"
+    given = f"and {where}, {pair_text(shared, network)}"
     expected = "a start in which lines are apart"
     if where == WITHOUT_CONTACT:
         expected = "first shapes in which lines are apart, for a damped motion with contact to lead to rest"

@@ -23,7 +23,7 @@ from hybrid.model.build import Model
 from hybrid.model.contents import touching
 from hybrid.model.ends import table_of_loads
 from hybrid.model.failure import unclamped, without_hold
-from hybrid.model.network import NetworkModel, NetworkResolution, build_system
+from hybrid.model.network import NetworkModel, NetworkResolution, build_network
 from hybrid.scene.base import Table
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
@@ -318,7 +318,7 @@ class RunOfLines:
             self._output()
 
     def gather_events(self) -> None:
-        """Record the events of the lines, in the result of the system with their names, as they happened."""
+        """Record the events of the lines, in the result of the network with their names, as they happened."""
         for gather in self.parts.gather:
             gather()
         self.file.gather()
@@ -368,26 +368,26 @@ class WatchedLines(Part):
 
 # Other loads and other motions of points and bodies from some time of a run of several lines on.
 
-# Tables of a system in which loads and motions stand.
+# Tables of a network in which loads and motions stand.
 LOADED = ("environment", "points", "bodies")
 
 
-def with_loads_of(system: Network, other: Network) -> Network:
-    """A system with the loads and motions of another one, which has the same lines."""
-    return system.model_copy(update={name: getattr(other, name) for name in LOADED})
+def with_loads_of(network: Network, other: Network) -> Network:
+    """A network with the loads and motions of another one, which has the same lines."""
+    return network.model_copy(update={name: getattr(other, name) for name in LOADED})
 
 
 def loaded_as(
-    model: NetworkModel, system: Network, t: float, fits: Iterable[Callable[[NetworkModel], NetworkModel]] = ()
+    model: NetworkModel, network: Network, t: float, fits: Iterable[Callable[[NetworkModel], NetworkModel]] = ()
 ) -> NetworkModel:
-    """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so.
+    """The same network from t (s) on with the loads and motions of a network; what is joined or loose stays so.
 
     fits: each gives a model the cells of now of some lines, in place of those of t = 0.
     """
-    other = build_system(system, model.resolution, model)
+    other = build_network(network, model.resolution, model)
     for fit in fits:
         other = fit(other)
-    models = tuple(_line_as(*each, system, t) for each in zip(model.names, model.models, other.models, strict=True))
+    models = tuple(_line_as(*each, network, t) for each in zip(model.names, model.models, other.models, strict=True))
     touching = model.touching
     if touching is not None:
         models = tuple(
@@ -400,7 +400,7 @@ def loaded_as(
     )  # fmt: skip
 
 
-def _line_as(name: str, now: Model, later: Model, system: Network, t: float) -> Model:
+def _line_as(name: str, now: Model, later: Model, network: Network, t: float) -> Model:
     """The model of a line with other loads, on its cells of now, with what has come off it."""
     for k in (0, 1):
         if now.ends.released[k]:
@@ -414,7 +414,7 @@ def _line_as(name: str, now: Model, later: Model, system: Network, t: float) -> 
         getattr(line, values)[:] = getattr(now.line, values)  # what is on its way goes on
     line = line._replace(torsion=now.line.torsion)
     if now.line.bits & SELF_CONTACT:
-        line = touching(line, system.lines[name].contact.friction)
+        line = touching(line, network.lines[name].contact.friction)
     later.sea.values.obstacles[:] = now.sea.values.obstacles  # as stiff as they were
     later.ends.go_on_from(now.ends, t)
     return replace(later, line=line)
@@ -436,12 +436,12 @@ class LoadChanges(Part):
 
     def begin_phase(self, t: float) -> None:
         """The next one holds from now on: lines stay what they are and where they are."""
-        run, system = self._run, self._changes[self._made].scene
+        run, network = self._run, self._changes[self._made].scene
         run.ends_of_now()
         for line in run.lines:
             line.write_down()
         run.gather_events()  # in the order in which they happen
-        run.network, run.model = system, loaded_as(run.model, system, run.t, [x.fit_models for x in run.parts])
+        run.network, run.model = network, loaded_as(run.model, network, run.t, [x.fit_models for x in run.parts])
         run.loaded = run.t  # loads that end now, or would have ended before, act no more
         run.start_from(run.rest)
         for line, model in zip(run.lines, run.model.models, strict=True):

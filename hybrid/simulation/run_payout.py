@@ -1,7 +1,7 @@
 """Lines of several that are paid out or taken in: lengths in compiled steps, nodes that enter and leave between them.
 
 Each of them has a reel (simulation.payout): steps follow the lengths, and where a node is due at
-a winch Python changes the line, and the system gets another solver.
+a winch Python changes the line, and the network gets another solver.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from hybrid.kernels.state.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state.state import Batch, Floats
 from hybrid.kernels.watch.named_quantities import PATH_ROW
 from hybrid.model.bodies import angles_of
-from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.network import NetworkModel, build_network
 from hybrid.model.plan import with_models
 from hybrid.model.resolution import model_is_free
 from hybrid.outputs.observation import Probe
@@ -44,12 +44,12 @@ from hybrid.store.hdf5_file import group_of
 MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
 
 
-def idle_ends(system: Network, model: NetworkModel) -> list[tuple[int, int]]:
+def idle_ends(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
     """Ends (line, 0 or 1) that are alone at a free point on which nothing acts, or have come loose."""
     found = []
     for number, (name, x, joints) in enumerate(zip(model.names, model.models, model.joints, strict=True)):
-        for k, point in enumerate((system.lines[name].start, system.lines[name].end)):
-            at = system.points[point]
+        for k, point in enumerate((network.lines[name].start, network.lines[name].end)):
+            at = network.points[point]
             loaded = getattr(at, "force", None) is not None or (isinstance(at, FreePoint) and at.is_body)
             if joints[k] < 0 and not x.ends.values.held[k] and (not loaded or (number, k) in model.loose):
                 found.append((number, k))
@@ -61,9 +61,9 @@ class RunQuantities(Part):
 
     name, is_of_form = "quantities", True
 
-    def __init__(self, system: Network, scenes: Mapping[str, LineScene]) -> None:
+    def __init__(self, network: Network, scenes: Mapping[str, LineScene]) -> None:
         """scenes: of the lines whose quantities are kept here, by name; others keep them themselves."""
-        self._wanted, self._scenes, self._system = system.output.quantities, scenes, system
+        self._wanted, self._scenes, self._network = network.output.quantities, scenes, network
         self._idle: frozenset[tuple[str, int]] = frozenset()
         self._of_line: dict[str, tuple[Quantities, dict[str, Probe]]] = {}
         self._steps: dict[str, StepQuantities] = {}  # their ranges over all steps, of a motion
@@ -105,7 +105,7 @@ class RunQuantities(Part):
 
     def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Know from now on which ends came loose: nothing takes their pull, which has no direction."""
-        self._idle = frozenset((model.names[line], k) for line, k in idle_ends(self._system, model))
+        self._idle = frozenset((model.names[line], k) for line, k in idle_ends(self._network, model))
         for name, x in self._steps.items():
             x.set_idle([k for line, k in self._idle if line == name])
 
@@ -191,10 +191,10 @@ class Rotations(Part):
 
     name, is_of_form = "rotations", True
 
-    def __init__(self, system: Network, model: NetworkModel) -> None:
+    def __init__(self, network: Network, model: NetworkModel) -> None:
         """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
         begin = {f"points/{name}/rotation": np.zeros(3) for name in model.rigid}
-        for name, body in system.bodies.items():
+        for name, body in network.bodies.items():
             given = body.initial_rotation if isinstance(body, FreeBody) else body.rotation
             begin[f"bodies/{name}/rotation"] = np.array(given, float)
         self.names = list(begin)
@@ -226,7 +226,7 @@ def nearest_angles(angles: Floats, before: Floats) -> Floats:
     return min(both, key=lambda x: float(((x - before) ** 2).sum()))
 
 
-# Forces between lines that touch each other, at the outputs of a system: which pairs are named, and their values.
+# Forces between lines that touch each other, at the outputs of a network: which pairs are named, and their values.
 
 
 def fields_of_pairs(model: NetworkModel) -> list[Field]:
@@ -290,7 +290,7 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     free, moves = [name for name in asked.lines if model_is_free(asked.asked_scene(name))], asked.time is not None
     asked = with_models(asked, dict.fromkeys(free, "adaptive"))
     scenes, found = asked.asked_scenes, list[Listed]()
-    model = build_system(asked)
+    model = build_network(asked)
     if "" not in scenes:  # which would record the quantities itself, and has no points beside it
         found = _over_time([*fields_of(asked), *fields_of_pairs(model), *RunQuantities(asked, scenes).fields])
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
@@ -324,14 +324,14 @@ def _over_time(fields: Iterable[Field], steps: bool = False, begin: str = "") ->
 WORKS = ("lines", "damping", "loads")
 
 
-def fields_of(system: Network) -> list[Field]:
+def fields_of(network: Network) -> list[Field]:
     """Place and velocity of all points and bodies, forces on them, energies of free bodies, and the sea at gauges."""
 
     def vector(name: str, unit: str, what: str) -> Field:
         return Field(name, unit, what, (3,), ("xyz",), "inertial")
 
     fields = []
-    for name, point in system.points.items():
+    for name, point in network.points.items():
         at = f"points/{name}"
         fields.append(vector(f"{at}/position", "m", f"position of point {name}"))
         fields.append(vector(f"{at}/velocity", "m/s", f"velocity of point {name}"))
@@ -339,15 +339,15 @@ def fields_of(system: Network) -> list[Field]:
             what = f"moment of the line that is clamped at point {name}, about it, which its support bears"
             fields.append(vector(f"{at}/moment", "N m", what))
         elif not isinstance(point, FreePoint):
-            bears = "its body" if system.body_of(name) is not None else "its support"
+            bears = "its body" if network.body_of(name) is not None else "its support"
             fields.append(vector(f"{at}/force", "N", f"force of the lines on point {name}, which {bears} bears"))
-            if system.clamped_at(name):
+            if network.clamped_at(name):
                 what = f"moment of the lines that are clamped at point {name}, about it, which {bears} bears"
                 fields.append(vector(f"{at}/moment", "N m", what))
-        elif system.clamped_at(name):
+        elif network.clamped_at(name):
             turns = f"rotation of point {name}: roll, pitch and yaw of its axes, about x, then y, then z"
             fields.append(Field(f"{at}/rotation", "deg", turns, (3,), ("xyz",), "inertial"))
-    for name, body in system.bodies.items():
+    for name, body in network.bodies.items():
         at = f"bodies/{name}"
         fields.append(vector(f"{at}/position", "m", f"position of the origin of body {name}"))
         turns = f"rotation of body {name}: roll, pitch and yaw, about x, then y, then z; beyond half a turn, too"
@@ -363,26 +363,26 @@ def fields_of(system: Network) -> list[Field]:
             for work in WORKS:
                 what = {"lines": "its lines", "damping": "its damping", "loads": "given loads"}[work]
                 fields.append(Field(f"{at}/work/{work}", "J", f"work done on body {name} by {what} since t = 0"))
-    if system.output.elevation:
-        fields.append(elevation_field(gauges_of(system)))
+    if network.output.elevation:
+        fields.append(elevation_field(gauges_of(network)))
     return fields
 
 
-def gauges_of(system: Network) -> Floats:
+def gauges_of(network: Network) -> Floats:
     """Places (n, 2) m at which the elevation of the sea is recorded."""
-    return np.array(system.output.elevation or (), float).reshape(-1, 2)
+    return np.array(network.output.elevation or (), float).reshape(-1, 2)
 
 
-def values_of(system: Network, model: NetworkModel, seen: Sampled) -> dict[str, Floats]:
+def values_of(network: Network, model: NetworkModel, seen: Sampled) -> dict[str, Floats]:
     """The values (nb, ...) of all fields for outputs."""
     values: dict[str, Floats] = {}
     t, count = seen.t, len(seen.bodies)
-    if system.output.elevation:  # the sea is that of every line
-        values["elevation"] = elevation(model.models[0].sea.values, gauges_of(system), seen.lines[0].sea_now)
-    pulls: dict[str, list[tuple[Floats, Floats, Floats]]] = {name: [] for name in system.bodies}
+    if network.output.elevation:  # the sea is that of every line
+        values["elevation"] = elevation(model.models[0].sea.values, gauges_of(network), seen.lines[0].sea_now)
+    pulls: dict[str, list[tuple[Floats, Floats, Floats]]] = {name: [] for name in network.bodies}
     none = np.zeros((count, 3))
-    for name, point in system.points.items():
-        at = [(model.names.index(line), -(end == "end")) for line, end in system.lines_at(name)]
+    for name, point in network.points.items():
+        at = [(model.names.index(line), -(end == "end")) for line, end in network.lines_at(name)]
         here = [(line, node) for line, node in at if (line, -node) not in model.loose]
         position, velocity = _place(model, seen, point, at[0], here)
         values[f"points/{name}/position"], values[f"points/{name}/velocity"] = position, velocity
@@ -391,14 +391,14 @@ def values_of(system: Network, model: NetworkModel, seen: Sampled) -> dict[str, 
                 frames = seen.frame(len(model.bodies) + model.rigid.index(name))
                 values[f"points/{name}/rotation"] = angles_of(frames)
             continue
-        moment = _clamp_moment(system, model, seen, name)
+        moment = _clamp_moment(network, model, seen, name)
         if moment is not None:
             values[f"points/{name}/moment"] = moment
         if isinstance(point, GuidedPoint):
             continue
         reports = [(seen.lines[k].report, FORCE_A - 3 * node) for k, node in here]
         values[f"points/{name}/force"] = force = sum((r[:, f : f + 3] for r, f in reports), none)
-        if system.body_of(name) is not None:
+        if network.body_of(name) is not None:
             pulls[point.body].append((position, force, none if moment is None else moment))  # type: ignore[union-attr]
     for name, known in model.known.items():
         found = [known.at_time(x) for x in t]
@@ -417,9 +417,9 @@ def values_of(system: Network, model: NetworkModel, seen: Sampled) -> dict[str, 
     return values
 
 
-def _clamp_moment(system: Network, model: NetworkModel, seen: Sampled, point: str) -> Floats | None:
+def _clamp_moment(network: Network, model: NetworkModel, seen: Sampled, point: str) -> Floats | None:
     """Moment (nb, 3) N m of the lines that are clamped at a point, about it; None: there are none."""
-    here = system.clamped_at(point)
+    here = network.clamped_at(point)
     if not here:
         return None
     moment = np.zeros((len(seen.bodies), 3))

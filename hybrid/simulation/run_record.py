@@ -117,17 +117,17 @@ class RunFile:
     """
 
     def __init__(
-        self, run: RunOfLines, system: Network, scenes: Mapping[str, LineScene], text: Text, asks: Recording
+        self, run: RunOfLines, network: Network, scenes: Mapping[str, LineScene], text: Text, asks: Recording
     ) -> None:
-        """system: with the loads of its start; scenes: of its lines by name; text: the scene, as the file has it."""
+        """network: with the loads of its start; scenes: of its lines by name; text: the scene, as the file has it."""
         scene = asks.asked.scene if asks.asked is not None else None
         self._run, self._text, self._asks = run, text, asks
         self._form = ShortForm((), {}) if scene is None else scene.form
         # The scene of the only line, if it has no name.
         self._alone: LineScene | None = scene.asked_lines.get("") if scene is not None else None
         # What is recorded beside the lines, by name.
-        self.quantities = RunQuantities(system, scenes if self._alone is None else {})
-        self.rotations = Rotations(system, run.model)
+        self.quantities = RunQuantities(network, scenes if self._alone is None else {})
+        self.rotations = Rotations(network, run.model)
 
     @property
     def _length(self) -> float:
@@ -190,20 +190,22 @@ class RunFile:
             return recorder
         if run.target is None:
             return ComparisonRecorder()
-        system, models = run.network, run.model.models
+        network, models = run.network, run.model.models
         attributes: dict[str, str | float | int] = {
-            "title": system.title, "cells": run.model.cells, "lines": len(models),
+            "title": network.title,
+            "cells": run.model.cells,
+            "lines": len(models),
             "length": sum(x.length for x in models),
-        }  # fmt: skip
+        }
         if run.found is not None:
             attributes |= {"static_path": run.found.summary, "static_residual": run.found.residual}
-        on_bodies = {x: point.body for x, point in system.points.items() if isinstance(point, Fairlead)}
+        on_bodies = {x: point.body for x, point in network.points.items() if isinstance(point, Fairlead)}
         if pending:
             attributes[PENDING] = pending
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
         fields = [*fields_of(run.network), *fields_of_pairs(run.model), *self.quantities.fields]
-        fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(system))]
+        fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(network))]
         header = Header(np.zeros(1), fields, (), attributes, self._texts, fixed)
         return self._recorder(header, {name: x for name, x in rows.items() if isinstance(x, Rows)})
 

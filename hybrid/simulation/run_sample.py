@@ -244,13 +244,15 @@ def restored_sample(
         raise ValueError("a run without cells, steps or outputs")
     shape = (every_of(shape[0], saved["every"]).size, *shape[1:])
     return RunSample(
-        **saved | {
-            "resolution": resolution, "notes": restored_notes(saved["notes"]),
+        **saved
+        | {
+            "resolution": resolution,
+            "notes": restored_notes(saved["notes"]),
             "values": restored_outputs(saved["values"], shape),
             "model_error": restored_outputs(saved["model_error"], shape),
             "at_edges": restored_outputs(saved["at_edges"], shape),
         }
-    )  # fmt: skip
+    )
 
 
 def restored_notes(tree: Any) -> Notes:

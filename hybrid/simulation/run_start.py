@@ -33,7 +33,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import EventLog, slack_remedy
 from hybrid.simulation.lines_contact import JUMP, crossed, diameters, jumps, least_bending, shared_of, watched_pairs
 from hybrid.solve.contact import SelfContact, SharedContact
-from hybrid.solve.contact_statics import settled_system, touching_solver
+from hybrid.solve.contact_statics import settled_network, touching_solver
 from hybrid.solve.lines_at_rest import Group, LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import Start, Tally, in_slower_currents, is_in_current
@@ -129,17 +129,17 @@ def _passes_another(model: NetworkModel, group: Group, first: NetworkState, foun
     return any(True for a, b in pairwise((first, *way[::-1])) for _ in crossed(model.touching, a, b))
 
 
-def crossings(system: Network, model: NetworkModel, rest: NetworkState) -> list[tuple[int, int]]:
+def crossings(network: Network, model: NetworkModel, rest: NetworkState) -> list[tuple[int, int]]:
     """Numbers of lines, two each, without contact, that cross on the straight way from first shapes to an equilibrium.
 
     A first shape says on which side of another line one lies where the scene gives it, or it hangs between held places.
     """
     known = [
-        x.start_shape == GIVEN or not (system.is_joined(line.start) or system.is_joined(line.end))
-        for x, line in zip(model.models, system.lines.values(), strict=True)
+        x.start_shape == GIVEN or not (network.is_joined(line.start) or network.is_joined(line.end))
+        for x, line in zip(model.models, network.lines.values(), strict=True)
     ]
-    pairs = [(a, b) for a, b in watched_pairs(system, model) if known[a] and known[b]]
-    among = touching_among(system, model.scenes, pairs)
+    pairs = [(a, b) for a, b in watched_pairs(network, model) if known[a] and known[b]]
+    among = touching_among(network, model.scenes, pairs)
     if among is None:
         return []
     return [*crossed(among, _before_current(replace(model, touching=among)), rest)]
@@ -165,7 +165,7 @@ def _before_current(model: NetworkModel) -> NetworkState:
 def at_rest_with_contact(model: NetworkModel, group: Group, start: NetworkState, near: bool = False) -> LinesAtRest:
     """The equilibrium with contact that a damped motion reaches from a start that is apart; near: as of that."""
     lines, keeps = group.lines, keeps_turns(group.lines, start, KEPT)
-    return settled_system(lines, group.points, group.bodies.copy(), start, lambda: contacts_of(model), keeps, near)
+    return settled_network(lines, group.points, group.bodies.copy(), start, lambda: contacts_of(model), keeps, near)
 
 
 def contacts_of(model: NetworkModel) -> tuple[list[SelfContact | None], SharedContact | None]:
@@ -281,12 +281,12 @@ def begin_as_placed(
         hold_by_friction(x.line, x.sea.at_time(0.0), joined_ends(x.ends.at_time(0.0), joints), one)
 
 
-def blended_of_lines(system: Network) -> Iterator[tuple[str, str]]:
+def blended_of_lines(network: Network) -> Iterator[tuple[str, str]]:
     """Points and bodies of lines, and texts of `note_blended`; empty ones of what has no file."""
-    for name, point in system.points.items():
+    for name, point in network.points.items():
         if isinstance(point, FixedPoint):
-            yield name, blended_text(f"points.{name}", point.motion, point.position, bool(system.clamped_at(name)))
-    for name, body in system.bodies.items():
+            yield name, blended_text(f"points.{name}", point.motion, point.position, bool(network.clamped_at(name)))
+    for name, body in network.bodies.items():
         if isinstance(body, FixedBody):
             yield "", blended_text(f"bodies.{name}", body.motion, body.position, True)
 

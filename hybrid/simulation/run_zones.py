@@ -237,7 +237,7 @@ class RunZones(Part):
         return min(
             float(x.ramp_step if ramps else x.steady_step)
             for x, ramps in ((x.switching.zones.clock, x.switching.manager.ramping) for x in self.lines)
-        )  # fmt: skip
+        )
 
     # --- checkpoints ------------------------------------------------------------------------------
 

@@ -263,7 +263,7 @@ class Saved(NamedTuple):
 
 
 def recorders(run: Run) -> list[Rows]:
-    """Those of the system and of its lines."""
+    """Those of the network and of its lines."""
     found = dict.fromkeys((run.recorder, *(line.recorder for line in run.lines)))  # that of a cable is the only one
     return [x for x in found if isinstance(x, Rows)]
 

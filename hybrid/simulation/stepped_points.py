@@ -77,7 +77,7 @@ def of_line(method: Callable[Concatenate[Any, str, P], R]) -> Callable[..., R]:
 class SteppedPoints(SettableObstacles):
     """The points and lines of a scene that is stepped from outside."""
 
-    _system: Network  # what is computed
+    _network: Network  # what is computed
     _form: ShortForm  # what points and lines are called in the scene
     _driven: dict[str, list[DrivenEnd]]  # of points that are set, for each end there
     _next: dict[str, Course]  # where points are to be at the end of the next step
@@ -270,7 +270,7 @@ class SteppedPoints(SettableObstacles):
         return dotted(self._form.place(("points", name)))
 
     def _is_on_body(self, name: str) -> bool:
-        return isinstance(self._system.points[name], Fairlead)
+        return isinstance(self._network.points[name], Fairlead)
 
     def _is_moved(self, name: str) -> bool:
         """Whether a motion of the scene moves a point."""

@@ -23,7 +23,7 @@ from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import CELLS, POINTS, Survey, layered, rods_at_rest, with_survey
 from hybrid.simulation.own_parts import RunPart, checked_parts
-from hybrid.simulation.run import Run, new_run, static_system
+from hybrid.simulation.run import Run, new_run, static_network
 from hybrid.simulation.run_record import Asked, Recording
 from hybrid.simulation.stepped import (
     ONE_STEP,
@@ -56,21 +56,21 @@ ASKED = ("_stops", "_driven", "_next", "_wound", "_moved", "_courses")
 NUMBER = (int, float, np.integer, np.floating)
 
 
-def layers_at_rest(system: Network) -> NetworkResolution:
+def layers_at_rest(network: Network) -> NetworkResolution:
     """Cells by the equilibrium of the start; where a line says how many cells a layer has, by that of full loads."""
-    asked = [name for name, line in system.lines.items() if line.resolution is not None]
-    scenes = {name: system.scene_of(name) for name in system.lines}
-    first = layered(scenes, NetworkResolution.of(scenes), lambda x: rods_at_rest(system, x, True))
+    asked = [name for name, line in network.lines.items() if line.resolution is not None]
+    scenes = {name: network.scene_of(name) for name in network.lines}
+    first = layered(scenes, NetworkResolution.of(scenes), lambda x: rods_at_rest(network, x, True))
     if not asked:
         return first
     memory = MemoryTarget()
     coarse = first.coarser(CELLS)
-    output = system.output.model_copy(update={"points": POINTS, "quantities": {}})
-    shown = system.model_copy(update={"output": output})
-    run = static_system(shown, memory, partial(scene_text, shown), coarse)
+    output = network.output.model_copy(update={"points": POINTS, "quantities": {}})
+    shown = network.model_copy(update={"output": output})
+    run = static_network(shown, memory, partial(scene_text, shown), coarse)
     found, lines = written_result(memory), dict(first.lines)
     for name in asked:
-        line, scene, model = found.lines[name], system.scene_of(name), run.model.models[run.model.names.index(name)]
+        line, scene, model = found.lines[name], network.scene_of(name), run.model.models[run.model.names.index(name)]
         outputs = {key: line[key] for key in ("position", "curvature", "tension")}
         lines[name] = with_survey(lines[name], scene, Survey.of(scene, lines[name], model, line.s, outputs))
     return NetworkResolution(lines)
@@ -109,10 +109,10 @@ class Simulation(SteppedPoints):
         names = self._run.model.names
         self._paid = [(k, x.paying) for k, x in enumerate(self._run.lines) if x.paying is not None]
         self._places = {
-            point: [(names.index(line), int(end == "end")) for line, end in self._system.lines_at(point)]
-            for point in self._system.points
+            point: [(names.index(line), int(end == "end")) for line, end in self._network.lines_at(point)]
+            for point in self._network.points
         }
-        time, self._stops = self._system.require_time(), self._run.stops()
+        time, self._stops = self._network.require_time(), self._run.stops()
         self._fixed_step, self._duration = None if time.controlled else time.step, time.duration
         self._sliver = SLIVER * self._run.resolution.one.step
         self._driven, self._next, self._wound = {}, {}, {}
@@ -127,16 +127,16 @@ class Simulation(SteppedPoints):
             raise SceneError([missing_time()])
         contact = {name: {"contact": x.contact.within(ends_are_set=True)} for name, x in scene.lines.items()}
         self.scene = in_space(scene.with_lines(contact))
-        self._system, self._form = self.scene, self.scene.form
+        self._network, self._form = self.scene, self.scene.form
 
     def _begun(self, most: int, criterion: UserCriterion | None, parts: Sequence[RunPart]) -> Run:
         """The run at its start; most: iterations that a step may take.  ComputationError."""
         compile_beside(self.scene)
         # in space points may be set anywhere
-        recording = Recording(planes=self._system.dimension == 2, asked=Asked(self.scene), parts=parts)
+        recording = Recording(planes=self._network.dimension == 2, asked=Asked(self.scene), parts=parts)
         with self._form.in_words():
-            cells, text = layers_at_rest(self._system), scene_text(self.scene)
-            run = new_run(self._system, self._target, text, True, cells, recording, criterion)
+            cells, text = layers_at_rest(self._network), scene_text(self.scene)
+            run = new_run(self._network, self._target, text, True, cells, recording, criterion)
         run.loop.counts.most_iterations, run.loop.most_rows, run.read_every = most, ROWS_OUTSIDE, READ_OUTSIDE
         run.stepped_outside = True
         try:

@@ -43,8 +43,10 @@ def following(model: NetworkModel, managers: Mapping[int, DomainManager]) -> dic
     return {k: x for k, x in managers.items() if share[k] > 0.0 and model.models[k].payout is None}
 
 
-def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping[int, DomainManager], t: float) -> Rest:
-    """Equilibrium of a system, rod wherever it may be; of lines with managers on the cells that it asks for.
+def equilibrium_on_cells(
+    network: Network, model: NetworkModel, managers: Mapping[int, DomainManager], t: float
+) -> Rest:
+    """Equilibrium of a network, rod wherever it may be; of lines with managers on the cells that it asks for.
 
     managers: by number of the line, of cells that follow.  Lines that touch themselves, are turned or are catenary
     somewhere begin on their shortest cells; so do all where there is no equilibrium on fewer, or lines touch.
@@ -53,7 +55,7 @@ def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping
     if fewer:
         try:
             few = _with(model, {k: with_fewer_cells(model.models[k]) for k in fewer})
-            found = equilibrium_of(system, few, t)
+            found = equilibrium_of(network, few, t)
             if not found.settled:
                 model, found = _on_planned_cells(few, found, fewer, t)
                 return _with_catenaries(model, found, managers, t)
@@ -61,7 +63,7 @@ def equilibrium_on_cells(system: Network, model: NetworkModel, managers: Mapping
             pass
     for k, manager in managers.items():
         manager.set_layout(model.models[k].zoned)
-    return _with_catenaries(model, equilibrium_of(system, model, t), managers, t)
+    return _with_catenaries(model, equilibrium_of(network, model, t), managers, t)
 
 
 def _may_have_fewer(model: NetworkModel, k: int, manager: DomainManager) -> bool:
@@ -70,7 +72,7 @@ def _may_have_fewer(model: NetworkModel, k: int, manager: DomainManager) -> bool
 
 
 def _with(model: NetworkModel, others: Mapping[int, Model]) -> NetworkModel:
-    """The same system with other models of some lines, by number."""
+    """The same network with other models of some lines, by number."""
     return replace(model, models=tuple(others.get(k, x) for k, x in enumerate(model.models)))
 
 
@@ -103,7 +105,7 @@ def _with_catenaries(model: NetworkModel, found: LinesAtRest, managers: Mapping[
 
 
 class Start(NamedTuple):
-    """Zones of a system at rest."""
+    """Zones of a network at rest."""
 
     model: NetworkModel
     found: LinesAtRest | None  # None: a motion begins as the scene says
@@ -125,17 +127,17 @@ def managers_for(
 
 
 def start_at_rest(
-    system: Network, scenes: Mapping[str, LineScene], model: NetworkModel, moves: bool, criterion: UserCriterion | None
+    network: Network, scenes: Mapping[str, LineScene], model: NetworkModel, moves: bool, criterion: UserCriterion | None
 ) -> Start:
     """Equilibrium with its zones and cells; moves: whether a motion begins there, else it has loads of full size."""
     t, managers = (0.0 if moves else np.inf), managers_for(scenes, model, criterion)
     follow = following(model, managers) if moves else {}
-    rest = equilibrium_on_cells(system, model, follow, t)
+    rest = equilibrium_on_cells(network, model, follow, t)
     return Start(*_zones_at_rest(*rest, {k: x for k, x in managers.items() if k not in follow}, t), managers)
 
 
 def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
-    """Zones for the equilibrium of a system whose lines with managers are all rod: rod only where it is needed.
+    """Zones for the equilibrium of a network whose lines with managers are all rod: rod only where it is needed.
 
     As of one cable (zones.at_start): where the two equilibria are further apart than the tolerance of a line
     criteria become stricter, and where that does not help zones stay rod.
@@ -209,12 +211,12 @@ def _within(
 
 
 def _asked(
-    managers: Mapping[int, DomainManager], system: NetworkModel, found: LinesAtRest, t: float
+    managers: Mapping[int, DomainManager], network: NetworkModel, found: LinesAtRest, t: float
 ) -> dict[int, np.ndarray]:
     """Base cells that the criteria want to be rod in an equilibrium, by number of the line."""
-    near, rods = nearness_in(system, joined_lines(system, t), found, t), {}
+    near, rods = nearness_in(network, joined_lines(network, t), found, t), {}
     for k, manager in managers.items():
-        model, state = system.models[k], found.state.lines[k]
+        model, state = network.models[k], found.state.lines[k]
         manager.near = near.get(k, np.zeros(0))
         manager.evaluate_criteria(model.line, model.sea.at_time(t), model.ends.at_time(t), state, 0.0)
         rods[k] = manager.initial_rods(state)

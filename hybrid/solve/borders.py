@@ -21,8 +21,8 @@ from hybrid.kernels.junctions.body_contact import EACH_BODY, TOUCHED, blank_meet
 from hybrid.kernels.junctions.borders import blank_border_job
 from hybrid.kernels.junctions.joined_lines import ANSWER, COLUMNS, FUNCTIONAL, TURNS
 from hybrid.kernels.junctions.junctions import HANDED, join_lines, twist_lines
-from hybrid.kernels.junctions.lines_contact import blank_touching_job, room_for_products, touch_system
-from hybrid.kernels.junctions.network_job import blank_system_job
+from hybrid.kernels.junctions.lines_contact import blank_touching_job, room_for_products, touch_network
+from hybrid.kernels.junctions.network_job import blank_network_job
 from hybrid.kernels.junctions.sheaves_and_winches import blank_spinning_job, blank_winding_job, spin_sheaves, wind_lines
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats
@@ -44,7 +44,7 @@ BORDERS = {
     "winches": Border(wind_lines, blank_winding_job),
     "sheaves": Border(spin_sheaves, blank_spinning_job),
     "torques": Border(twist_lines, blank_border_job),
-    "contact": Border(touch_system, blank_touching_job),
+    "contact": Border(touch_network, blank_touching_job),
 }
 
 
@@ -52,18 +52,18 @@ class Rooms(NamedTuple):
     """What jobs of lines work in, whichever they are of; only one of them works at a time."""
 
     whole: Values  # of a kernels.junctions.network_job.NetworkJob
-    rows: Values  # likewise, with a row for each line of the system
+    rows: Values  # likewise, with a row for each line of the network
     borders: dict[str, Callable[[Sequence[int]], Values | None]]  # of borders by name, for lines; None: they have none
 
 
 class JointJobs:
-    """Jobs of both parities for some lines of a system, with all of its points and bodies."""
+    """Jobs of both parities for some lines of a network, with all of its points and bodies."""
 
     def __init__(self, rooms: Rooms, numbers: NDArray[np.int64], lines: Sequence[int]) -> None:
         """numbers: (2, n, ..) jobs of these lines for both parities; lines: their numbers."""
         self._rooms, self._lines, self._is_listed = rooms, list(lines), False
         self._borders: list[tuple[Border, tuple[Table, Table]]] = []
-        first = Table(blank_system_job)
+        first = Table(blank_network_job)
         first.bind(borders=np.zeros(0, np.int64), border_tables=np.zeros((0, 0), np.int64))
         first.bind(**rooms.whole, **self._of_these(rooms.rows))
         self.jobs = first, first.again(np.empty_like(first.numbers))
@@ -72,7 +72,7 @@ class JointJobs:
         self.set_borders()
 
     def _of_these(self, rows: Values) -> Values:
-        """Arrays of all lines of the system, of these lines."""
+        """Arrays of all lines of the network, of these lines."""
         if len(self._lines) == len(rows["begins"]):
             return rows
         return {name: np.ascontiguousarray(x[self._lines]) for name, x in rows.items()}
@@ -85,7 +85,7 @@ class JointJobs:
             if own is not None:
                 tables = Table(border.blank), Table(border.blank)
                 for job, table in zip(self.jobs, tables, strict=True):
-                    table.bind(system=job.numbers, rank=len(self._borders), **own)
+                    table.bind(network=job.numbers, rank=len(self._borders), **own)
                 self._borders.append((border, tables))
         if self._is_listed:
             self._list()
@@ -172,7 +172,7 @@ def contact_of(
 ) -> Values | None:
     """Contact of lines with themselves and each other, as far as they are of these.
 
-    room: of all lines of the system; contacts: (L, ..) tables of their contact; shared: (L, 2) the line that has that
+    room: of all lines of the network; contacts: (L, ..) tables of their contact; shared: (L, 2) the line that has that
     of each, -1: none has, and where its nodes begin there.
     """
     chosen = list(lines)

@@ -388,15 +388,15 @@ def _failed(lines: Sequence[JoinedLine], taken: NetworkTaken, states: NetworkSta
     return LineFailed(taken.line, taken.outcome, None, None, "\n              ".join(path))
 
 
-def settled_system(
+def settled_network(
     lines: Sequence[JoinedLine], points: int, bodies: Floats, start: NetworkState, contacts: Contacts,
     keeps_turns: Callable[[NetworkState], tuple[int, str]], near: bool = False,
 ) -> LinesAtRest:  # fmt: skip
-    """Equilibrium of a system with contact of lines with themselves, from a start that is at rest and apart.
+    """Equilibrium of a network with contact of lines with themselves, from a start that is at rest and apart.
 
     points: how many free points there are; contacts: makes contact, without friction; keeps_turns: a line that has lost
     turns in a state, and how many, empty: none has; near: Newton's method is tried from the start itself first.
-    An equilibrium that would not stay is left by a small push.  LineFailed: the system does not come to rest,
+    An equilibrium that would not stay is left by a small push.  LineFailed: the network does not come to rest,
     or only where it would not stay, a line has lost turns, or ends with a catenary that is not taut.
     """
     smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~(WAVES | FRICTION | SELF_FRICTION))) for x in lines]

@@ -1,4 +1,4 @@
-"""The tables by which kernels know the lines of a system: of all of them, of those solved together, of each alone."""
+"""The tables by which kernels know the lines of a network: of all of them, of those solved together, of each alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybrid.kernels.junctions.network_job import APART, APART_ALWAYS, JOINED, Ne
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
-from hybrid.kernels.run.network import solve_system
+from hybrid.kernels.run.network import solve_network
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
@@ -49,7 +49,7 @@ def _torques_of(twists: Sequence[bool]) -> Callable[[Sequence[int]], dict[str, A
 
 
 class LineJobs:
-    """Jobs of the lines of a system: of all, of those that are solved together, and of each by itself."""
+    """Jobs of the lines of a network: of all, of those that are solved together, and of each by itself."""
 
     # What is set by whoever solves for them (solve.network_solver).
     tolerance: float  # of Newton's method in steps
@@ -100,7 +100,7 @@ class LineJobs:
     def _make_tables(self) -> None:
         """Tables of all lines, and which are solved by themselves at first."""
         blank, lines = Table(blank_job), self.lines
-        # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
+        # Of each line two tables, as of the network: states that take turns lead from the one to the other and back.
         self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
         self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
         self._rooms = self._make_rooms()
@@ -298,7 +298,7 @@ class LineJobs:
         if self.is_apart:
             return 0
         self._let_march()
-        return solve_system.address(self._all.jobs[0].numbers)
+        return solve_network.address(self._all.jobs[0].numbers)
 
     def _let_march(self) -> None:
         """Jobs of joined lines know the kernels that march them and couple them, which take long to compile."""

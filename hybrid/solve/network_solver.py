@@ -21,7 +21,7 @@ from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.run.entry import workspace_of
-from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_system_step, solve_system
+from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_network_step, solve_network
 from hybrid.kernels.state.report import (
     FRICTION,
     LOCAL_ERROR,
@@ -53,7 +53,7 @@ NO_BODIES: Floats = np.zeros((0, NUMBERS))
 
 
 class NetworkSolver(LineJobs):
-    """Solves for all lines of a system at once; owns the work arrays, not the states.
+    """Solves for all lines of a network at once; owns the work arrays, not the states.
 
     It works in space, but for steps of lines that are joined to nothing and are marked as planar.
     """
@@ -92,7 +92,7 @@ class NetworkSolver(LineJobs):
             task.rho_before, task.fixed, t, 1.0, task.cut, limits.tolerance, task.cv, task.ca,
         )  # fmt: skip
         self._let_march()
-        outcome, iterations, left, line, where = solve_system(self._all.jobs[0].numbers)
+        outcome, iterations, left, line, where = solve_network(self._all.jobs[0].numbers)
         return NetworkTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
     def _march(self, what: int, ca: float, states: NetworkState, t: float = 0.0) -> NetworkTaken:
@@ -254,7 +254,7 @@ class NetworkSolver(LineJobs):
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
         used, ratio = float(self.work[0].report[USED_RHO]), float((errors / self.allowed).max())
         if not ratio > REFUSED:
-            book_system_step(self._all.jobs[0].numbers)
+            book_network_step(self._all.jobs[0].numbers)
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
     def consistent_accelerations(

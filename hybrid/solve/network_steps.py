@@ -17,7 +17,7 @@ from hybrid.kernels.junctions.bodies import WORK, update_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.remesh import ask_cells, change_cells
 from hybrid.kernels.mesh.zone_step import advance_zones
-from hybrid.kernels.run.network import BODY_SAMPLE, book_system_step
+from hybrid.kernels.run.network import BODY_SAMPLE, book_network_step
 from hybrid.kernels.run.network_run import (
     CUT_LINE,
     LINE,
@@ -26,8 +26,8 @@ from hybrid.kernels.run.network_run import (
     TURNED_LINE,
     blank_steps_job,
     run_lines,
-    run_system,
-    sample_system,
+    run_network,
+    sample_network,
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import REPORT_SIZE, SEEN
@@ -108,7 +108,7 @@ ROWS_OUTSIDE = 4096
 
 
 class NetworkSteps:
-    """Steps of all lines of a system. Lengths follow errors where a largest one is given, else they are equal."""
+    """Steps of all lines of a network. Lengths follow errors where a largest one is given, else they are equal."""
 
     def __init__(
         self,
@@ -169,7 +169,7 @@ class NetworkSteps:
             outputs=self.outputs, bodies=self.body_samples, worked=self.worked, clock=self.clock, counts=counts,
             lines=self.lines, seen=self.seen, log=self._log,
             limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm, solver.tolerance]),
-            sampler=sample_system.address(self._job.numbers), **jobs,
+            sampler=sample_network.address(self._job.numbers), **jobs,
         )  # fmt: skip
         self._first = jobs["even"]
         return True
@@ -258,7 +258,7 @@ class NetworkSteps:
         if not known:
             return np.zeros((len(lines), 1), np.int64), may, 0, 0
         tables = np.array([np.zeros_like(known[0]) if x is None else x for x in lines])
-        self._job.bind(runner=run_system.address(self._job.numbers))
+        self._job.bind(runner=run_network.address(self._job.numbers))
         return tables, may, ask_cells.address(known[0]), change_cells.address(known[0])
 
     def bind_tangents(self, job: np.ndarray, follower: int) -> None:
@@ -297,12 +297,12 @@ class NetworkSteps:
         """Go on until a code of kernels.state.books."""
         assert self._solver is not None
         if self._first is not None:
-            self._job.bind(solver=self._solver.joint_solver(), book=book_system_step.address(self._first))
+            self._job.bind(solver=self._solver.joint_solver(), book=book_network_step.address(self._first))
             self._first = None
         if self._is_new and self._solver.mixes:
             self._solver.find_near(self.states[0], float(self.clock.now))
             self._job.bind(**self._solver.regroup())
-        self._is_new, go = False, run_lines if self._changes or self._winds else run_system
+        self._is_new, go = False, run_lines if self._changes or self._winds else run_network
         while (code := int(go(self._job.numbers))) == REGROUP:
             self._job.bind(**self._solver.regroup())
         return code
@@ -320,7 +320,7 @@ class NetworkSteps:
 
     def sample(self) -> bool:
         """Sample the outputs that are due at the state as it is; False: there is no room for all of them."""
-        return bool(sample_system(self._job.numbers))
+        return bool(sample_network(self._job.numbers))
 
     def try_again(self) -> None:
         """The try is made once more, in the same length: what it was made with has changed."""

@@ -101,9 +101,11 @@ class Attempt(NamedTuple):
 
 
 def first_sound(
-    ways: Iterable[Attempt], tally: Tally, refused: Callable[[NetworkState], tuple[Outcome, int, int]] | None = None,
+    ways: Iterable[Attempt],
+    tally: Tally,
+    refused: Callable[[NetworkState], tuple[Outcome, int, int]] | None = None,
     before: Sequence[str] = (),
-) -> tuple[tuple[str, ...], Attempt]:  # fmt: skip
+) -> tuple[tuple[str, ...], Attempt]:
     """The first attempt that leads to an equilibrium, or to a slack one that is taken, and how those before it went.
 
     refused: why an equilibrium is not the one that is sought (OK: it may be), the line, and its node or cell; before:

@@ -95,7 +95,7 @@ def hold_by_friction(line: Line, sea: Sea, ends: Ends, state: State) -> None:
 
 
 class JoinedLine(NamedTuple):
-    """One line of a system."""
+    """One line of a network."""
 
     line: Line
     sea: Sea
@@ -116,7 +116,7 @@ class JoinedLine(NamedTuple):
 
 
 class NetworkState(NamedTuple):
-    """All that a system knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""
+    """All that a network knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""
 
     lines: Sequence[State]
     bodies: Floats = np.zeros((0, STATE))

@@ -233,7 +233,7 @@ def image_of(file: h5py.File) -> bytes:
     """The bytes of a file in memory, which is closed."""
     file.flush()
     image = bytes(file.id.get_file_image())
-    file.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines of a system squared
+    file.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines of a network squared
     return image
 
 
@@ -452,7 +452,7 @@ def of_part(name: str, counts: Mapping[str, int]) -> dict[str, int]:
 
 
 def of_all(counts: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-    """Counts by name of a system (under the name "") and of its lines as one table."""
+    """Counts by name of a network (under the name "") and of its lines as one table."""
     return {group_of(name) + key: count for name, each in counts.items() for key, count in each.items()}
 
 

@@ -70,14 +70,16 @@ def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) 
     return {
         "font": {"family": _FONT, "size": 13, "color": INK},
         "margin": {"l": 56, "r": 22, "t": 32, "b": 44},  # at the top plotly's buttons, the legend at the foot
-        "paper_bgcolor": "#FFFFFF", "plot_bgcolor": panel.fill,
+        "paper_bgcolor": "#FFFFFF",
+        "plot_bgcolor": panel.fill,
         "hovermode": "closest" if any(isinstance(item, Map) for item in panel.items) else "x",
-        "xaxis": axis(panel.x, across), "yaxis": up_axis,
+        "xaxis": axis(panel.x, across),
+        "yaxis": up_axis,
         "legend": {"orientation": "h", "tracegroupgap": 0, "x": 0, "y": 0, "yanchor": "bottom", "yref": "container"}
         | {"font": {"size": 12}},
         "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "align": "left"}
         | {"font": {"size": 12, "color": INK, "family": _FONT}},
-    }  # fmt: skip
+    }
 
 
 def _annotation(item: Text) -> Spec:
@@ -377,9 +379,11 @@ def _mark(item: Marks, x: float, y: float) -> str:
     if item.symbol == "o":
         return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}" {look}/>'
     corners = {
-        "s": ((-1, -1), (1, -1), (1, 1), (-1, 1)), "D": ((0, -1.3), (1.3, 0), (0, 1.3), (-1.3, 0)),
-        "^": ((0, -1.2), (1.1, 0.9), (-1.1, 0.9)), "v": ((0, 1.2), (1.1, -0.9), (-1.1, -0.9)),
-    }  # fmt: skip
+        "s": ((-1, -1), (1, -1), (1, 1), (-1, 1)),
+        "D": ((0, -1.3), (1.3, 0), (0, 1.3), (-1.3, 0)),
+        "^": ((0, -1.2), (1.1, 0.9), (-1.1, 0.9)),
+        "v": ((0, 1.2), (1.1, -0.9), (-1.1, -0.9)),
+    }
     if item.symbol in corners:
         outer = "L".join(f"{x + r * a:.1f} {y + r * b:.1f}" for a, b in corners[item.symbol])
         return f'<path d="M{outer}Z" {look}/>'

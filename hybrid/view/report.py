@@ -70,10 +70,12 @@ from hybrid.view.zones import shares, zone_map
 LIMITED = ("tension", "bend", "slack", "quantity")
 # Extremes of each line in the table: quantity, bound, heading, unit.
 EXTREMES = (
-    ("tension", "max", "largest tension", "N"), ("tension", "min", "smallest tension", "N"),
-    ("curvature", "max", "largest curvature", "1/m"), ("bending_moment", "max", "largest bending moment", "N m"),
+    ("tension", "max", "largest tension", "N"),
+    ("tension", "min", "smallest tension", "N"),
+    ("curvature", "max", "largest curvature", "1/m"),
+    ("bending_moment", "max", "largest bending moment", "N m"),
     ("self_contact", "max", "contact with lines", "N/m"),
-)  # fmt: skip
+)
 
 
 def statistics_of_all(result: Result, every: AllLines) -> str:

@@ -46,9 +46,11 @@ def scenery(result: Result, every: AllLines, shown: dict[str, Kept], store: Stor
         "marks": _marks(result, every, store, frames),
         "planes": planes,
         "far": far,
-        "box": box.T.tolist(), "factors": factors.tolist(), "ink": INK,
+        "box": box.T.tolist(),
+        "factors": factors.tolist(),
+        "ink": INK,
         "speed": speed_of(every.as_result),
-    }  # fmt: skip
+    }
 
 
 def _with_gaps(pieces: list[np.ndarray], between: float = np.nan) -> np.ndarray:

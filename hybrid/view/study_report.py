@@ -134,9 +134,10 @@ def html(study: Path) -> str:
     found = open_study(study)
     variables = [name for name in json.loads(found.attrs["variables"]) if name in found]
     results = sorted(
-        str(name) for name in found.data_vars
+        str(name)
+        for name in found.data_vars
         if found[name].dims == ("case",) and name not in (*OWN, "status") and found[name].dtype.kind == "f"
-    )  # fmt: skip
+    )
     columns = {"case": _column(found, "case")} | {name: _column(found, name) for name in variables}
     columns["status"] = {"unit": "", "description": "", "values": [STATUS[int(k)] for k in found["status"].values]}
     columns |= {name: _column(found, name) for name in (*results, *OWN) if name in found}

@@ -19,7 +19,7 @@ from tests.simulation.bits import Stopping, differences, went_on
 from tests.simulation.test_one_world import between_springs
 from tests.simulation.test_releases import scene_break as carried
 from tests.simulation.test_system_contact import RUBS
-from tests.simulation.test_system_contact import system as touching
+from tests.simulation.test_system_contact import network as touching
 from tests.simulation.test_system_saving import clamped, mooring, spar
 from tests.simulation.test_system_zones import followed
 from tests.simulation.test_system_zones import mooring as slackening

@@ -93,7 +93,7 @@ BY_CELLS = 1e-4
 
 
 def answer(tables: Tables) -> hybrid.Result | str:
-    """The motion of a scene, whose steps end at outputs, of a system that of its line; why it cannot be computed."""
+    """The motion of a scene, whose steps end at outputs, of a network that of its line; why it cannot be computed."""
     try:
         found = hybrid.run(tables | {"output": tables["output"] | {"exact": True}})
     except (SceneError, ComputationError) as error:

@@ -32,7 +32,7 @@ def hung(model: str = "rod", **more: Any) -> Tables:
     ) | deepcopy(STEPS) | more  # fmt: skip
 
 
-def system(tables: Tables) -> Tables:
+def network(tables: Tables) -> Tables:
     return as_network(tables | {"initial": {"kind": "equilibrium"}})
 
 
@@ -133,7 +133,7 @@ def test_a_line_that_touches_itself_in_a_plane_stays_in_it() -> None:
 OUT: list[tuple[Tables, str, float | None]] = [
     (over(axis=[0.4, 1, 0]), "", 0.0),
     (over("sphere", at=[4.0, 0.2, 0.9]), "", None),
-    (system(over(axis=[0.4, 1, 0])), "line cable", 0.0),
+    (network(over(axis=[0.4, 1, 0])), "line cable", 0.0),
     (with_body(centre=[0.1, 0.1, -0.2]), "buoy leaves it", 0.0),
     (with_body(moment={"value": [3, 0, 0], "ramp": 0.5}), "buoy leaves it", 0.0),
 ]  # fmt: skip
@@ -149,9 +149,9 @@ def test_what_leaves_the_plane_stops(tables: Tables, words: str, since: float | 
 
 
 REFUSED: list[tuple[Tables, str]] = [
-    (system(hung()) | {"environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}}}, r"environment\.fluid"),
+    (network(hung()) | {"environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}}}, r"environment\.fluid"),
     (with_body() | {"points": with_body()["points"] | {"b": {"position": [9, 0.5, 1]}}}, r"points\.b\.position"),
-    (tables_with(system(hung()), {"lines.cable.sections": [SECTION | {"tension_torque": 1e-3}]}), "there is no torsion"),
+    (tables_with(network(hung()), {"lines.cable.sections": [SECTION | {"tension_torque": 1e-3}]}), "there is no torsion"),
 ]  # fmt: skip
 
 

@@ -42,10 +42,10 @@ def on_a_body(path: Path) -> Path:
 
 
 def started(path: Path = DECK) -> moordyn.MoorDyn:
-    system = moordyn.Create(str(path))
-    x = PLACES if moordyn.NCoupledDOF(system) == 9 else [0.0, 0.0, -14.0, 0.0, 0.0, 0.0]
-    assert moordyn.Init(system, x, [0.0] * len(x)) == 0
-    return system
+    network = moordyn.Create(str(path))
+    x = PLACES if moordyn.NCoupledDOF(network) == 9 else [0.0, 0.0, -14.0, 0.0, 0.0, 0.0]
+    assert moordyn.Init(network, x, [0.0] * len(x)) == 0
+    return network
 
 
 @pytest.mark.parametrize("what", ["point", "body", "point of a body"])
@@ -64,36 +64,36 @@ def test_loads_of_what_the_caller_moves_are_refused(what: str, tmp_path: Path) -
 
 
 def test_it_starts_from_the_equilibrium_of_the_imported_scene() -> None:
-    system = started()
+    network = started()
     result = hybrid.static(next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene)
     for k in (1, 2, 3):
-        line = moordyn.GetLine(system, k)
+        line = moordyn.GetLine(network, k)
         end = result.lines[f"line{k}"].reaction_end[0]
-        point = moordyn.GetPoint(system, 3 + k)
+        point = moordyn.GetPoint(network, 3 + k)
         assert moordyn.GetPointForce(point) == pytest.approx(-end, rel=1e-6, abs=1e-3)
         assert moordyn.GetLineN(line) == moordyn.GetLineNumberNodes(line) - 1 == (20, 20, 10)[k - 1]
         assert moordyn.GetLineNodePos(line, moordyn.GetLineN(line)) == pytest.approx(PLACES[3 * k - 3 : 3 * k])
-        assert moordyn.GetLineNodePos(line, 0) == moordyn.GetPointPos(moordyn.GetPoint(system, k))
-    assert moordyn.GetLineUnstretchedLength(moordyn.GetLine(system, 1)) == pytest.approx(815.0)
-    assert [moordyn.GetPointType(moordyn.GetPoint(system, k)) for k in (1, 4)] == [
+        assert moordyn.GetLineNodePos(line, 0) == moordyn.GetPointPos(moordyn.GetPoint(network, k))
+    assert moordyn.GetLineUnstretchedLength(moordyn.GetLine(network, 1)) == pytest.approx(815.0)
+    assert [moordyn.GetPointType(moordyn.GetPoint(network, k)) for k in (1, 4)] == [
         moordyn.POINT_TYPE_FIXED, moordyn.POINT_TYPE_COUPLED,
     ]  # fmt: skip
-    assert moordyn.Close(system) == 0
+    assert moordyn.Close(network) == 0
 
 
 def test_forces_of_a_motion_are_those_of_the_scene_that_has_it(tmp_path: Path) -> None:
     """The caller's places and velocities at the begin of its steps; the scene's motion from a file of its own."""
     dt, steps = 0.05, 80
-    system = moordyn.Create(str(DECK))
-    moordyn.SetDt(system, dt)
-    moordyn.Init(system, PLACES, STILL)
+    network = moordyn.Create(str(DECK))
+    moordyn.SetDt(network, dt)
+    moordyn.Init(network, PLACES, STILL)
     found = []
     for k in range(steps):
         (d0, _), (d1, _) = surge(k * dt), surge((k + 1) * dt)
         x = [p + (d0 if i == 0 else 0.0) for i, p in enumerate(PLACES)]
         v = [(d1 - d0) / dt if i == 0 else 0.0 for i in range(9)]
-        found.append(moordyn.Step(system, x, v, 3.0 + k * dt, dt))
-    moordyn.Close(system)
+        found.append(moordyn.Step(network, x, v, 3.0 + k * dt, dt))
+    moordyn.Close(network)
 
     rows = "\n".join(f"{t:.4f},{40 + surge(t)[0]:.12f},0,-14" for t in np.arange(0.0, steps * dt + 0.3, 0.05))
     (tmp_path / "surge.csv").write_text(f"t,x,y,z\n{rows}\n")
@@ -148,17 +148,17 @@ WRONG: list[Callable[[Any], Any]] = [
 
 
 def test_wrong_uses_are_errors_in_words_and_it_goes_on() -> None:
-    system = started()
+    network = started()
     for wrong in WRONG:
         with pytest.raises(ValueError, match=r"\w+.*(expected|already).*"):
-            wrong(system)
-    assert len(moordyn.Step(system, PLACES, STILL, 0.0, 0.1)) == 9
+            wrong(network)
+    assert len(moordyn.Step(network, PLACES, STILL, 0.0, 0.1)) == 9
     with pytest.raises(ValueError, match="where the last step ended"):
-        moordyn.Step(system, PLACES, STILL, 0.0, 0.1)
-    assert moordyn.GetFASTtens(system, 3)[0][0] > moordyn.GetFASTtens(system, 3)[2][0] > 0.0
-    assert moordyn.GetLineFairTen(moordyn.GetLine(system, 1)) == moordyn.GetLineMaxTen(moordyn.GetLine(system, 1))
-    moordyn.Close(system)
-    for after in (lambda: moordyn.Step(system, PLACES, STILL, 0.1, 0.1), lambda: moordyn.Close(system)):
+        moordyn.Step(network, PLACES, STILL, 0.0, 0.1)
+    assert moordyn.GetFASTtens(network, 3)[0][0] > moordyn.GetFASTtens(network, 3)[2][0] > 0.0
+    assert moordyn.GetLineFairTen(moordyn.GetLine(network, 1)) == moordyn.GetLineMaxTen(moordyn.GetLine(network, 1))
+    moordyn.Close(network)
+    for after in (lambda: moordyn.Step(network, PLACES, STILL, 0.1, 0.1), lambda: moordyn.Close(network)):
         with pytest.raises(ValueError, match="not running"):
             after()
 
@@ -171,49 +171,49 @@ def test_a_deck_that_is_no_scene_is_refused_with_its_line() -> None:
 def test_points_of_a_system_are_set_by_name() -> None:
     data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
     data |= {"time": {"duration": 1.0, "step": 0.05}}
-    with hybrid.Simulation(data) as system:
-        before = system.point("point4").force
-        system.set_point("point4", [40.02, 0, -14])
+    with hybrid.Simulation(data) as network:
+        before = network.point("point4").force
+        network.set_point("point4", [40.02, 0, -14])
         for until in (0.3, 0.37, 1.0):
-            assert system.advance(until) == pytest.approx(until)
-        assert system.point("point4").position == pytest.approx([40.02, 0.0, -14.0])
-        assert system.point("point4").force[0] != before[0]
+            assert network.advance(until) == pytest.approx(until)
+        assert network.point("point4").position == pytest.approx([40.02, 0.0, -14.0])
+        assert network.point("point4").force[0] != before[0]
         for wrong in (
-            lambda: system.set_point("anchor", [0, 0, 0]), lambda: system.set_point("point4", [0, nan, 0]),
-            lambda: system.advance(0.5), lambda: system.advance(2.0), lambda: system.line("x"),
+            lambda: network.set_point("anchor", [0, 0, 0]), lambda: network.set_point("point4", [0, nan, 0]),
+            lambda: network.advance(0.5), lambda: network.advance(2.0), lambda: network.line("x"),
         ):  # fmt: skip
             with pytest.raises(ValueError, match="expected"):
                 wrong()
-        result = system.result()
+        result = network.result()
     assert result.status == "complete"
     assert result.lines["line1"].tension.shape[0] == result.times.size
     with pytest.raises(ValueError, match="over"):
-        system.advance(1.0)
+        network.advance(1.0)
 
 
 def test_scripts_that_ask_the_deck_where_things_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The calls of MoorDyn's example and of its smallest test: states before Init, names of older versions."""
-    system = moordyn.Create(str(on_a_body(tmp_path / "body.txt")))
-    assert moordyn.GetNumberBodies(system) == 1
-    body = moordyn.GetBody(system, 1)
+    network = moordyn.Create(str(on_a_body(tmp_path / "body.txt")))
+    assert moordyn.GetNumberBodies(network) == 1
+    body = moordyn.GetBody(network, 1)
     assert moordyn.GetBodyID(body) == 1 and moordyn.GetBodyType(body) == moordyn.BODY_TYPE_COUPLED
     x, xd = (np.array(part) for part in moordyn.GetBodyState(body))
     assert x.tolist() == [0, 0, -14, 0, 0, 0] and not xd.any()
-    moordyn.Init(system, x, xd)
-    f = moordyn.Step(system, x, [0.1, 0, 0, 0, 0, 0], 0.0, 0.5)
+    moordyn.Init(network, x, xd)
+    f = moordyn.Step(network, x, [0.1, 0, 0, 0, 0, 0], 0.0, 0.5)
     assert len(f) == 6
     state, rates = moordyn.GetBodyState(body)
     assert state == pytest.approx([0.05, 0, -14, 0, 0, 0]) and rates[0] == 0.1
-    moordyn.Close(system)
+    moordyn.Close(network)
 
     (tmp_path / "Mooring").mkdir()
     (tmp_path / "Mooring" / "lines.txt").write_text(DECK.read_text(encoding="utf-8"), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    system = moordyn.Create()
-    places = [x for k in (4, 5, 6) for x in moordyn.GetConnectPos(moordyn.GetConnection(system, k))]
+    network = moordyn.Create()
+    places = [x for k in (4, 5, 6) for x in moordyn.GetConnectPos(moordyn.GetConnection(network, k))]
     assert places == PLACES
-    assert not any(moordyn.GetPointForce(moordyn.GetPoint(system, 4)))
-    assert moordyn.Init(system, places, STILL) == 0 and moordyn.Close(system) == 0
+    assert not any(moordyn.GetPointForce(moordyn.GetPoint(network, 4)))
+    assert moordyn.Init(network, places, STILL) == 0 and moordyn.Close(network) == 0
     with pytest.raises(RuntimeError, match="file"):
         moordyn.Create("file.invalid")
     with pytest.raises(hybrid.SceneError):
@@ -241,14 +241,14 @@ def test_a_body_turns_as_moordyn_turns_it(tmp_path: Path) -> None:
     """Angles about x, the turned y, the turned z (R = Rx Ry Rz), as MoorDyn 2.7 has them; a deck needs no lines for it."""
     path = tmp_path / "turned.txt"
     path.write_text(TURNED, encoding="utf-8")
-    system = moordyn.Create(str(path))
-    points = [moordyn.GetPoint(system, k) for k in (1, 2, 3)]
-    assert moordyn.Init(system, [0] * 6, [0] * 6) == 0
+    network = moordyn.Create(str(path))
+    points = [moordyn.GetPoint(network, k) for k in (1, 2, 3)]
+    assert moordyn.Init(network, [0] * 6, [0] * 6) == 0
     assert np.array([moordyn.GetPointPos(x) for x in points]) == pytest.approx(np.eye(3))
     rates = np.radians([10.0, 20.0, 30.0])
     for k in range(2):
-        r, _ = moordyn.GetBodyState(moordyn.GetBody(system, 1))
-        assert moordyn.Step(system, r, [0, 0, 0, *rates], float(k), 1.0) == [0.0] * 6
+        r, _ = moordyn.GetBodyState(moordyn.GetBody(network, 1))
+        assert moordyn.Step(network, r, [0, 0, 0, *rates], float(k), 1.0) == [0.0] * 6
     found = np.array([moordyn.GetPointPos(x) for x in points]).T
     expected = Rotation.from_euler("XYZ", [20, 40, 60], degrees=True)
     assert found == pytest.approx(expected.as_matrix(), abs=1e-12)
@@ -257,5 +257,5 @@ def test_a_body_turns_as_moordyn_turns_it(tmp_path: Path) -> None:
     later = Rotation.from_euler("XYZ", np.degrees([2 + t, 2 + t, 2 + t] * rates), degrees=True).as_matrix()
     assert spin == pytest.approx((later - found) @ found.T / t, abs=1e-5)
     with pytest.raises(ValueError, match="no line"):
-        moordyn.GetLine(system, 1)
-    moordyn.Close(system)
+        moordyn.GetLine(network, 1)
+    moordyn.Close(network)

@@ -45,14 +45,14 @@ def refused(uses: list[Callable[[], Any]]) -> int:
 # --- several lines -------------------------------------------------------------------------------
 
 
-def system(duration: float = 1.0) -> hybrid.Simulation:
+def network(duration: float = 1.0) -> hybrid.Simulation:
     data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
     return hybrid.Simulation(data | {"time": {"duration": duration, "step": 0.05}})
 
 
 def test_several_lines_have_the_verbs_of_one_cable() -> None:
     """`step` does the same of both, up to the duration; an end is a point; what is of one line asks for its name."""
-    with system(0.22) as stepped, system(0.22) as advanced:
+    with network(0.22) as stepped, network(0.22) as advanced:
         assert [stepped.step() for _ in range(5)] == pytest.approx([0.05, 0.1, 0.15, 0.2, 0.22], abs=1e-12)
         assert [advanced.advance(t) for t in (0.05, 0.1, 0.15, 0.2, 0.22)]
         assert np.array_equal(stepped.line("line1").position, advanced.line("line1").position)
@@ -64,7 +64,7 @@ def test_several_lines_have_the_verbs_of_one_cable() -> None:
     with pytest.raises(ValueError, match="is over"):
         stepped.step()
     places = []
-    with system(0.1) as lines:
+    with network(0.1) as lines:
         for verb in (lines.set_point, lines.set_end):
             saved = lines.save()
             verb("point4", [PLACE[0], PLACE[1], PLACE[2] + 0.1])
@@ -127,10 +127,10 @@ def uses_of_a_system(s: hybrid.Simulation) -> Iterator[Callable[[], Any]]:
 
 
 def test_wrong_uses_of_several_lines() -> None:
-    with system() as plain:
+    with network() as plain:
         plain.advance(0.2)
         expected = plain.line("line1").position
-    with system() as asked:
+    with network() as asked:
         asked.advance(0.1)
         count = refused(list(uses_of_a_system(asked)))
         assert asked.t == 0.1
@@ -144,7 +144,7 @@ def test_wrong_uses_of_several_lines() -> None:
 
 def test_two_threads_in_several_lines() -> None:
     """A second thread is refused in words, and the first goes on; repeated until both have met."""
-    with system(30.0) as lines:
+    with network(30.0) as lines:
         found: list[str] = []
         for k in range(1, 60):
             busy = threading.Thread(target=lines.advance, args=(0.5 * k,))

@@ -10,7 +10,7 @@ from hybrid.designs import network_at_rest
 from hybrid.designs.network_at_rest import at_rest
 from hybrid.designs.numbers import with_number
 from hybrid.model.nearby import seats_know_no_shape, shaped_anew
-from hybrid.model.network import NetworkResolution, bodies_of, build_system
+from hybrid.model.network import NetworkResolution, bodies_of, build_network
 from hybrid.scene.read import as_scene
 from tests.designs.differences import agree
 
@@ -249,10 +249,10 @@ def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, mo
 @pytest.mark.parametrize("what", ["two bodies", "without normals", "twist that hangs on first shapes"])
 def test_lines_that_are_built_alone_are_those_of_the_whole(what):
     tables, _, _ = SCENES[what]
-    system = as_scene(tables)
-    resolution = NetworkResolution.first(system)
-    whole = build_system(system, resolution)
-    model, seats = shaped_anew(system, ["hose"], bodies_of(system), resolution)["hose"]
+    network = as_scene(tables)
+    resolution = NetworkResolution.first(network)
+    whole = build_network(network, resolution)
+    model, seats = shaped_anew(network, ["hose"], bodies_of(network), resolution)["hose"]
     theirs, l = whole.models[whole.names.index("hose")], whole.names.index("hose")
     np.testing.assert_array_equal(seats, whole.seats[l])
     assert np.abs(seats).max() > 0.0

@@ -193,7 +193,7 @@ def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(
     assert not changed("kernels/run/network_run.py", '"""Steps of all lines until', '"""Steps of lines until')
     constant = changed("kernels/state/books.py", "FAILED = range(6)", "FAILED = range(50, 56)")
     assert (
-        "hybrid.kernels.run.network_run.run_system" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
+        "hybrid.kernels.run.network_run.run_network" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
     )
     field = "    itself: int = 0  # address of"
     moved = changed("kernels/step/newton.py", field, "    another: int = 0\n" + field)

@@ -293,8 +293,8 @@ def test_moored_body():
 
 def test_joints_give_way_as_the_solver_says():
     """(K + ca M)^-1 at points and bodies is the compliance that the junctions of the solver have from its factors."""
-    system = as_scene(PIPE)
-    rest = equilibrium_of(system)
+    network = as_scene(PIPE)
+    rest = equilibrium_of(network)
     solver, states = rest.solver, rest.states
     network = linear_network(solver, states, rest.names, False)
     m = 3 * len(rest.points) + 6 * len(rest.bodies)

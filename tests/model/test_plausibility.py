@@ -199,13 +199,13 @@ def test_what_nothing_makes_right_is_refused(name: str) -> None:
 
 def test_a_point_of_several_lines_that_heaves_into_the_bed_is_refused() -> None:
     heave = {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}
-    system = environment() | {
+    network = environment() | {
         "points": {"anchor": {"position": [0, 0, -100.0], "motion": heave}, "top": {"position": [205.0, 0, 0]}},
         "lines": {"leg": {"start": "anchor", "end": "top", "sections": [{"length": 250.0} | CHAIN]}},
         "time": {"duration": 60.0, "step": 0.05},
     }
     with pytest.raises(SceneError) as caught:
-        hybrid.validate_scene(system)
+        hybrid.validate_scene(network)
     assert [x.where for x in caught.value.complaints] == ["points.anchor.motion"]
 
 

@@ -299,11 +299,11 @@ LINKED = SYSTEM.replace(
 
 
 def test_clearance_of_two_lines(tmp_path: Path) -> None:
-    still = hybrid.static(_system(SYSTEM))
+    still = hybrid.static(_network(SYSTEM))
     assert still.gap[0] == pytest.approx(2.0 - 0.15, abs=1e-9) and still.gap_at[0] == pytest.approx(3 / 1.001, rel=1e-6)
     assert still.pull[0] == pytest.approx(1e5 * 0.001, rel=1e-6)
     assert [x.broken for x in held_of(still)] == [True]
-    moving = _system(SYSTEM + "time: {duration: 2, step: 0.05}\n")
+    moving = _network(SYSTEM + "time: {duration: 2, step: 0.05}\n")
     result = hybrid.run(moving, tmp_path / "two.h5")
     one, two = result.lines["one"], result.lines["two"]
     for at in (1, len(result.times) - 1):
@@ -315,7 +315,7 @@ def test_clearance_of_two_lines(tmp_path: Path) -> None:
     assert {x.name for x in hybrid.listed_outputs(moving)} >= {"gap", "gap_at", "pull", "lines/one/tension"}
 
 
-def _system(text: str) -> hybrid.Scene:
+def _network(text: str) -> hybrid.Scene:
     found, _ = read_text(text)
     assert isinstance(found, hybrid.Scene)
     return found
@@ -364,7 +364,7 @@ def test_names_of_results_are_taken() -> None:
 ])  # fmt: skip
 def test_refused_of_several_lines(change: str, match: str) -> None:
     with pytest.raises(hybrid.SceneError, match=match):
-        _system(LINKED[: LINKED.index("    gap:")] + f"    gap: {change}\n")
+        _network(LINKED[: LINKED.index("    gap:")] + f"    gap: {change}\n")
 
 
 # --- The elevation of the sea as an output: of a regular wave by its formula, of many components by their sum ---

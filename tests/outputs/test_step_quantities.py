@@ -166,9 +166,9 @@ output:
 @pytest.mark.long
 def test_ranges_of_several_lines(tmp_path: Path) -> None:
     def run(text: str, name: str) -> hybrid.Result:
-        system = read_text(text)[0]
-        assert isinstance(system, hybrid.Scene)
-        return hybrid.run(system, tmp_path / name)
+        network = read_text(text)[0]
+        assert isinstance(network, hybrid.Scene)
+        return hybrid.run(network, tmp_path / name)
 
     dense = run(SYSTEM, "dense.h5")
     sparse = run(SYSTEM.replace("every: 0.05", "every: 0.5"), "sparse.h5")

@@ -315,10 +315,10 @@ def test_points_and_lines_are_added_whole() -> None:
     section = "sections: [{length: 300, mass: 5, axial_stiffness: 1.0e+7}]"
     text = f"points: {{a: {{position: [0, 0, 0]}}, b: {{position: [9, 0, 0]}}}}\nlines: {{x: {{start: a, end: b, {section}}}}}"
     more = ["points.c={position: [1, 9, 0]}", f"lines.y={{start: b, end: c, {section}}}"]
-    system, _ = read_text(text, overrides=more)
-    assert isinstance(system, Network) and (list(system.points), list(system.lines)) == (["a", "b", "c"], ["x", "y"])
-    system, _ = read_text(text, overrides=[*more, "lines.y=null", "points.c=null"])
-    assert isinstance(system, Network) and (list(system.points), list(system.lines)) == (["a", "b"], ["x"])
+    network, _ = read_text(text, overrides=more)
+    assert isinstance(network, Network) and (list(network.points), list(network.lines)) == (["a", "b", "c"], ["x", "y"])
+    network, _ = read_text(text, overrides=[*more, "lines.y=null", "points.c=null"])
+    assert isinstance(network, Network) and (list(network.points), list(network.lines)) == (["a", "b"], ["x"])
     for override, told in (
         ("points.bb.position=[1, 9, 0]", "did you mean b?; points.bb={...} adds it, with all of its keys"),
         ("points.bb=null", "did you mean b?"), ("obstacles.o.kind=plane", "obstacles.o={...} adds it"),
@@ -436,14 +436,14 @@ time: {duration: 20, step: 0.05}
 
 def test_a_copy_of_several_lines_keeps_nothing_of_the_lines_it_was_copied_from() -> None:
     """Also with the lowest pydantic, in which nothing can be deleted of a frozen model."""
-    system, _ = read_text(TWO_LINES, "lines.yaml")
-    assert isinstance(system, Network)
-    assert system.lines_at("buoy") == [("west", "end"), ("east", "start")]
-    assert system.scene_of("east").length == 185.0
+    network, _ = read_text(TWO_LINES, "lines.yaml")
+    assert isinstance(network, Network)
+    assert network.lines_at("buoy") == [("west", "end"), ("east", "start")]
+    assert network.scene_of("east").length == 185.0
     longer = {"length": 190.0}
-    section = system.lines["east"].sections[0].model_copy(update=longer)
-    east = system.lines["east"].model_copy(update={"sections": (section,)})
-    other = system.model_copy(update={"lines": {"east": east}})
+    section = network.lines["east"].sections[0].model_copy(update=longer)
+    east = network.lines["east"].model_copy(update={"sections": (section,)})
+    other = network.model_copy(update={"lines": {"east": east}})
     assert other.lines_at("buoy") == [("east", "start")]
-    assert (other.scene_of("east").length, system.scene_of("east").length) == (190.0, 185.0)
-    assert system.lines_at("buoy") == [("west", "end"), ("east", "start")]
+    assert (other.scene_of("east").length, network.scene_of("east").length) == (190.0, 185.0)
+    assert network.lines_at("buoy") == [("west", "end"), ("east", "start")]

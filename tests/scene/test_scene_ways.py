@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.model.plausibility import implausible
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel, farthest, shift
@@ -214,6 +214,6 @@ def test_lines_that_cannot_reach_each_other_are_no_pair(second: dict[str, Any], 
     near, far = lines(2.0 * HALF_WAY + 1.0), lines(2.0 * HALF_WAY + 5.0, **second)
     assert near.meeting_pairs == [("line0", "line1")]
     assert bool(far.meeting_pairs) == meet
-    assert (build_system(far).touching is not None) == meet
+    assert (build_network(far).touching is not None) == meet
     named = hybrid.validate_scene(far.model_dump(exclude_none=True) | {"contact": {"between": [["line0", "line1"]]}})
     assert named.meeting_pairs == [("line0", "line1")]

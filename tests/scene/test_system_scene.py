@@ -31,19 +31,19 @@ time: {duration: 20, step: 0.05}
 """
 
 
-def system(text: str, *settings: str) -> Network:
+def network(text: str, *settings: str) -> Network:
     found, _ = read_text(text, "lines.yaml", settings)
     assert isinstance(found, Network)
     return found
 
 
 def test_a_system_is_read_changed_and_written() -> None:
-    found = system(TEXT, "time.step=0.1", "points.buoy.mass=1200", "lines.west.mesh={cells: 20}")
+    found = network(TEXT, "time.step=0.1", "points.buoy.mass=1200", "lines.west.mesh={cells: 20}")
     assert found.time is not None and found.time.step == 0.1
     assert found.free == ("buoy",) and found.lines_at("buoy") == [("west", "end"), ("east", "start")]
     assert found.carried("west") == ("end",) and found.carried("east") == ()
     assert found.lines["west"].mesh is not None and found.lines["west"].chosen_model.kind == "catenary"
-    assert system(scene_text(found)) == found
+    assert network(scene_text(found)) == found
     plan = hybrid.plan(found)
     assert plan.cells == 120 and plan.free == ("buoy",) and plan.steps == 200
 
@@ -89,11 +89,11 @@ def test_a_pendant_may_be_the_first_line_at_its_knot() -> None:
         "  top: {initial_guess: [0, 0, 9], mass: 10, volume: 0.1}\nlines:\n"
         "  pendant: {start: buoy, end: top, sections: [{length: 9, mass: 1, diameter: 0.05, drag: {normal: 1}}]}\n",
     )
-    assert system(text).carried("pendant") == ("start",)
+    assert network(text).carried("pendant") == ("start",)
 
 
 def test_a_guess_out_of_reach_is_only_a_guess() -> None:
-    found = system(TEXT.replace("initial_guess: [0, 0, 5]", "initial_guess: [0, 0, 500]"))
+    found = network(TEXT.replace("initial_guess: [0, 0, 5]", "initial_guess: [0, 0, 500]"))
     result = hybrid.static(found)
     assert abs(result["points/buoy/position"][-1, 0]) < 1e-6 and result["points/buoy/position"][-1, 2] < 30
 
@@ -113,20 +113,20 @@ time: {duration: 30, step: 0.1}
 
 def test_a_float_may_follow_a_tug_that_leaves_its_first_guess() -> None:
     """The tug goes 50 m from where the float is first looked for, at the end of a line of 40 m: the float follows."""
-    assert hybrid.plan(system(TOW)).steps == 300
+    assert hybrid.plan(network(TOW)).steps == 300
     with pytest.raises(SceneError) as refused:
-        system(TOW.replace("[40, 0, 0]", "[80, 0, 0]"))
+        network(TOW.replace("[40, 0, 0]", "[80, 0, 0]"))
     (told,) = refused.value.complaints
     assert told.where == "points.tug.motion.travel" and "from point anchor" in str(refused.value)
     text = TOW.replace("{start: anchor,", "{start: anchor, break_at: {time: 1, end: start},")
-    assert system(text.replace("[40, 0, 0]", "[80, 0, 0]")).lines["leg"].break_at is not None
+    assert network(text.replace("[40, 0, 0]", "[80, 0, 0]")).lines["leg"].break_at is not None
 
 
 def test_points_farther_apart_than_lines_reach_are_refused_with_the_line() -> None:
     with pytest.raises(
         SceneError, match=r"points\.east(?s:.*)1050 m(?s:.*)388\.5 m from point west, as far as lines west, east"
     ):
-        hybrid.static(system(TEXT.replace("[150, 0, -100]", "[900, 0, -100]")))
+        hybrid.static(network(TEXT.replace("[150, 0, -100]", "[900, 0, -100]")))
 
 
 @pytest.mark.parametrize(

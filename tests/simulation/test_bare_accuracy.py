@@ -212,14 +212,14 @@ def test_a_limit_that_is_nearly_reached_is_settled_at_a_loose_accuracy() -> None
 def test_lines_of_a_system_ask_the_same(accuracy: str | None) -> None:
     """Each of what it moves by itself; a line that names no model, a rod as well, asks for no curvature."""
     line = {"sections": [{"length": LENGTH, "mass": 3.0, "bending_stiffness": 50.0, "diameter": DIAMETER}]}
-    system = as_scene(
+    network = as_scene(
         network_scene({"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0]}, "c": {"position": [0, 80, 0]}},
                       {"plain": {"start": "a", "end": "b", **line},
                        "named": {"start": "a", "end": "c", "model": "rod", **line}},
                       time={"duration": 4.0}) | ({"accuracy": accuracy} if accuracy else {})
     )  # fmt: skip
     for name in ("plain", "named"):
-        asking = system.scene_of(name)
+        asking = network.scene_of(name)
         assert asking.model.kind == "rod"
         found = sizes(asking, run(5.0))
         assert found["position"] == pytest.approx(0.05)

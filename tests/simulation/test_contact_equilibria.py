@@ -177,7 +177,7 @@ def test_a_line_that_loses_its_turns_without_contact_is_found_with_it(monkeypatc
     assert judged[0] == judged[1]
 
 
-# --- Equilibria of systems with lines that touch themselves: beside each other, at a body, and runs that begin there
+# --- Equilibria of networks with lines that touch themselves: beside each other, at a body, and runs that begin there
 # ---
 
 WIDTH_BESIDE_BODY = 0.02
@@ -300,11 +300,11 @@ SCENE = next(x.partition("```")[0] for x in PAGE.split("```yaml\n")[1:] if x.sta
 
 @pytest.mark.parametrize(("guess", "wound"), [((7.9, -2.2, -21), ["lower", "upper"]), ((0, 0, -30), [])])
 def test_a_line_that_rests_wound_up_is_noted(guess: tuple[float, ...], wound: list[str]) -> None:
-    """The system is symmetric about y = 0; from the first guess it is found wound up about its lines."""
+    """The network is symmetric about y = 0; from the first guess it is found wound up about its lines."""
     given = "tee: {initial_guess: [0, 0, -30]}"
     assert given in SCENE
-    system = yaml.safe_load(SCENE.replace(given, f"tee: {{initial_guess: {list(guess)}}}"))
-    result = hybrid.static(system)
+    network = yaml.safe_load(SCENE.replace(given, f"tee: {{initial_guess: {list(guess)}}}"))
+    result = hybrid.static(network)
     assert [n for n, x in result.lines.items() if any(e.kind == "several equilibria" for e in x.events)] == wound
     twisted = abs(result.lines["lower"].torque[-1]).max() > 1e-3 * abs(result.lines["lower"].bending_moment[-1]).max()
     assert twisted == bool(wound)
@@ -314,12 +314,12 @@ def test_a_twist_that_a_moment_makes_is_no_news() -> None:
     line = {"mass": 1, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 100, "torsional_stiffness": 50}
     ends = {"start": {"tangent": [1, 0, 0]}, "end": {"tangent": [1, 0, 0]}}
     common = {"connections": ends, "sections": [{"length": 5, **line}], "mesh": {"cells": 10}}
-    system = network_scene(
+    network = network_scene(
         {"low": {"position": [0, 0, 0]}, "high": {"position": [10.01, 0, 0]},
          "middle": {"kind": "free", "initial_guess": [5, 0, 0], "moment": [60, 0, 0]}},
         {"a": {"start": "low", "end": "middle", **common}, "b": {"start": "middle", "end": "high", **common}}, gravity=0
     )  # fmt: skip
-    result = hybrid.static(system)
+    result = hybrid.static(network)
     for name, torque in (("a", 30.0), ("b", -30.0)):  # 3 rad between its ends
         assert result.lines[name].torque[-1] == pytest.approx(torque, rel=1e-6)
         assert all(e.kind != "several equilibria" for e in result.lines[name].events)

@@ -12,7 +12,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.books import PARTS_ITSELF
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.simulation import run_record
 from tests.scenes import line_between, network_scene
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, bridle, crossing, lowered
@@ -79,11 +79,11 @@ def test_where_contact_is_off_or_an_accuracy_is_asked_lines_pass_and_that_is_sai
     assert BEGINS not in kinds(off := hybrid.run(unasked(contact=NOT_ASKED)))
     assert PASSAGE in kinds(off)
     for more in ({"accuracy": "3%"}, {"output": {"errors": True}}, {"time": {"duration": 1.0}}):
-        assert build_system(system_of(unasked(**more))).may_meet == ()
-    assert build_system(system_of(unasked())).may_meet == (0, 1)
+        assert build_network(system_of(unasked(**more))).may_meet == ()
+    assert build_network(system_of(unasked())).may_meet == (0, 1)
     thin = deepcopy(unasked())
     del thin["lines"]["lower"]["sections"][0]["diameter"]
-    assert build_system(system_of(thin)).may_meet == ()
+    assert build_network(system_of(thin)).may_meet == ()
 
 
 @pytest.mark.parametrize("half", [0.02, 0.05, 0.1])

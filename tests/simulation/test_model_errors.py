@@ -469,7 +469,7 @@ def cable(**more: Any) -> dict[str, Any]:
     )
 
 
-def system(**more: Any) -> dict[str, Any]:
+def network(**more: Any) -> dict[str, Any]:
     line = {"start": "a", "end": "b", "sections": [SECTION], "mesh": {"cells": 20}} | more
     other = line | {"start": "a", "end": "c"}
     points = {"a": {"position": [0, 0, 0]}, "b": HEAVE, "c": {"position": [-9, 0, 0]}}
@@ -492,7 +492,7 @@ def test_a_cable_that_goes_slack_becomes_a_rod(tmp_path: Path) -> None:
 
 
 def test_a_line_of_a_system_that_goes_slack_becomes_a_rod() -> None:
-    result = hybrid.run(system())
+    result = hybrid.run(network())
     assert result.status == "complete" and result.times[-1] == 2.0
     (text,) = chosen_slack(result.events)
     assert text.startswith("line right: computed as rods") and "no other line has changed" in text
@@ -501,7 +501,7 @@ def test_a_line_of_a_system_that_goes_slack_becomes_a_rod() -> None:
     assert kinds == {"left": {"catenary"}, "right": {"rod"}}
 
 
-@pytest.mark.parametrize("scene", [cable(model="catenary"), system(model="catenary")])
+@pytest.mark.parametrize("scene", [cable(model="catenary"), network(model="catenary")])
 def test_a_catenary_that_is_asked_for_stops(scene: dict[str, Any]) -> None:
     with pytest.raises(ComputationError) as stopped:
         hybrid.run(scene)
@@ -510,7 +510,7 @@ def test_a_catenary_that_is_asked_for_stops(scene: dict[str, Any]) -> None:
 
 def test_the_plan_says_what_a_slack_line_may_cost() -> None:
     """And counts steps whose loads still grow as those of grown loads: the motion of the end has a ramp of 1.6 s."""
-    open_, named = as_scene(system()), as_scene(system(model="catenary"))
+    open_, named = as_scene(network()), as_scene(network(model="catenary"))
     assert isinstance(open_, Network) and isinstance(named, Network)
     assert open_.slack_becomes_rod and not named.slack_becomes_rod and _grown(open_) == 1.6
     plan = replace(hybrid.plan(open_, measure=False), seconds=8.0, most_seconds=19.0)

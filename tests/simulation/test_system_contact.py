@@ -1,4 +1,4 @@
-"""Lines of a system that touch themselves: as one cable does, beside points that move, resumed, and what is refused."""
+"""Lines of a network that touch themselves: as one cable does, beside points that move, resumed, and what is refused."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOW, HIGH, CLOSER = [0, 0, 0], [1.2, 0, 0.45], {"travel": {"by": [1.22, 0.95 * W
 TIME, OUTPUT = {"duration": 1.7, "step": 0.01}, {"every": 0.02, "points": 81}
 
 
-def system(**more: Any) -> dict[str, Any]:
+def network(**more: Any) -> dict[str, Any]:
     """A line hangs in a U between an end that is moved until its legs touch, and a tail; free: where they meet."""
     line = {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 80}, "sections": [HOSE], "contact": RUBS}
     tail = {"start": "free", "end": "high", "model": "catenary", "mesh": {"cells": 5}, "sections": [TAIL]}
@@ -35,7 +35,7 @@ def system(**more: Any) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("contact") / "whole.h5"
-    hybrid.run(system(), path, progress=False).close()
+    hybrid.run(network(), path, progress=False).close()
     return path
 
 
@@ -74,7 +74,7 @@ def test_a_line_touches_itself_as_one_cable_does(whole: Path) -> None:
 )
 def test_what_is_not_computed_is_refused(more: dict[str, Any], says: str) -> None:
     with pytest.raises(hybrid.SceneError, match=says):
-        hybrid.validate_scene(system(**more))
+        hybrid.validate_scene(network(**more))
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_what_is_not_computed_is_refused(more: dict[str, Any], says: str) -> Non
 )
 def test_the_plan_says_which_lines_have_it(more: dict[str, Any], on: bool, why: str) -> None:
     """A line that cannot reach itself lies nearly straight between points that nothing moves."""
-    scene = system(contact={})
+    scene = network(contact={})
     line = scene["lines"]["hose"] | more
     places = {"a": {"position": [0, 0, 0]}, "b": {"position": [3.99, 0, 0]}}
     places["weak"] = places["b"] | {"break_at": {"tension": 1e3}}
@@ -104,7 +104,7 @@ def test_an_equilibrium_within_itself_is_refused() -> None:
     """A weight pulls the legs of a line straight, 0.8 diameters apart."""
     thin = HOSE | {"bending_stiffness": 0.02}
     clump = {"kind": "clump", "at": 2.0, "mass": 50.0}
-    scene = system(sections=[thin], attachments=[clump], end="high", mesh={"cells": 800})  # which show the bend
+    scene = network(sections=[thin], attachments=[clump], end="high", mesh={"cells": 800})  # which show the bend
     scene["points"] = {"low": {"position": [0, 0, 0]}, "high": {"position": [0, 0.8 * WIDTH, 0]}}
     del scene["lines"]["tail"]
     with pytest.raises(hybrid.SceneError, match=r"lines\.hose\.contact[\s\S]*s = .* m and s = .* m[\s\S]*initial"):

@@ -25,7 +25,7 @@ TIME = {"duration": 12.0, "step": 0.05}
 
 
 def buoy(**tables: Any) -> dict[str, Any]:
-    """A buoy at the surface on one line, as a system."""
+    """A buoy at the surface on one line, as a network."""
     return {
         "environment": SEA,
         "points": {"anchor": PINNED, "buoy": {"kind": "free", "initial_guess": [40, 5, -1]} | BODY},

@@ -1,4 +1,4 @@
-"""Zones that move in lines of a system: those of the cable, each line by itself, through stops and breaks."""
+"""Zones that move in lines of a network: those of the cable, each line by itself, through stops and breaks."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.read import one_line
@@ -91,7 +91,7 @@ def test_too_few_cells_for_the_turns_are_refused():
 
 
 def test_an_equilibrium_that_has_lost_a_turn_is_refused(monkeypatch):
-    model = build_system(in_full(taut(second={"turns": 3})))
+    model = build_network(in_full(taut(second={"turns": 3})))
     lost = build(one_line(taut(second={"turns": 2}))).start
     (state,) = (x.start for x in model.models)
     text, s = equilibrium.lost_turns(model, 0.0, 0, state._replace(a1=lost.a1))

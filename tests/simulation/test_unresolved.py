@@ -390,7 +390,7 @@ def test_steps_that_are_watched_go_on_from_a_checkpoint(tmp_path: Path) -> None:
 
 
 def test_what_a_kernel_writes_into_a_table_it_does_not_read_there() -> None:
-    """Tables are read as what never changes (kernels.machine.references): what solve_system writes into those of its lines,
+    """Tables are read as what never changes (kernels.machine.references): what solve_network writes into those of its lines,
 
     cv, ca and dt of their tasks, is passed to what is inlined in it."""
     folder = Path(hybrid.kernels.__file__).parent

@@ -17,7 +17,7 @@ from hybrid.errors import SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import frame_of
 from hybrid.model.build import build
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
 from hybrid.simulation.run import Run, new_run
@@ -479,5 +479,5 @@ def test_between_held_points_the_first_shape_carries_the_frame(points: dict[str,
             model="rod",
         )
     )
-    alone, joined = build(one_line(scene)), build_system(in_full(scene)).models[0]
+    alone, joined = build(one_line(scene)), build_network(in_full(scene)).models[0]
     assert np.allclose(joined.ends.values.frame, alone.ends.values.frame, rtol=0, atol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.solve.contact_statics import ContactStability, contact_stiffness
 from hybrid.solve.lines_at_rest import LinesAtRest
@@ -48,8 +48,8 @@ def on_top(joined: bool = False, aside: float = 0.0) -> Tables:
 
 
 def equilibrium(tables: Tables) -> LinesAtRest:
-    system = system_of(tables)
-    return equilibrium_of(system, build_system(system), np.inf)
+    network = system_of(tables)
+    return equilibrium_of(network, build_network(network), np.inf)
 
 
 def test_the_stiffness_of_contact_is_the_derivative_of_its_forces() -> None:

@@ -59,7 +59,7 @@ def banded(rows, tension):
 
 
 def disagreement(model, state, cv, ca):
-    """March against LAPACK for one Newton system, relative to the largest correction of each kind of unknown."""
+    """March against LAPACK for one Newton network, relative to the largest correction of each kind of unknown."""
     rows = block_rows(model.line)
     work = workspace_of(model.line)._replace(rows=rows)
     work.u[:] = 0.0
@@ -88,7 +88,7 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
     # relative to the weight: what is out of balance is round-off of moments EI/h^2 per node at worst
     assert found.residual < 1e-9 * model.tension_scale + 100 * EPS * stiffness / h**2
 
-    # a Newton system far from its solution: a wavy line of the right length, and one step of time
+    # a Newton network far from its solution: a wavy line of the right length, and one step of time
     wavy = model.start.copy()
     wavy.e[:, 2] += 0.3 * line.h * np.sin(np.linspace(0, 6, cells))
     wavy.e[:] *= (line.h / np.linalg.norm(wavy.e, axis=1))[:, None]

@@ -13,7 +13,7 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import build
-from hybrid.model.network import NetworkModel, build_system
+from hybrid.model.network import NetworkModel, build_network
 from hybrid.scene.network import Network
 from hybrid.scene.read import one_line, read_text, scene_text
 from hybrid.scene.root import in_full
@@ -310,7 +310,7 @@ def hairpin(cells: int, model: str = "rod", apart: float = 0.0, **more: Any) -> 
 
 def model_of(tables: dict[str, Any]) -> tuple[Network, NetworkModel]:
     network = in_full(hybrid.validate_scene(tables))
-    return network, build_system(network)
+    return network, build_network(network)
 
 
 def rest_of(tables: dict[str, Any]) -> tuple[Line, State]:

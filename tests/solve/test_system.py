@@ -132,7 +132,7 @@ def test_what_consistent_accelerations_are() -> None:
 
 
 def equilibrium(tables: dict[str, Any]) -> Run:
-    """The equilibrium of a system, not yet written."""
+    """The equilibrium of a network, not yet written."""
     import io
 
     return new_run(hybrid.Scene.model_validate(tables), io.BytesIO(), "", moves=False)

@@ -135,7 +135,7 @@ except ResultError as error:
 
 @pytest.mark.parametrize("limit", [531_782, 1_289_002])
 def test_what_was_written_of_several_lines_stays(limit: int, tmp_path: Path) -> None:
-    """Lines have all outputs that their system has, with their numbers."""
+    """Lines have all outputs that their network has, with their numbers."""
     path = tmp_path / "run.h5"
     said = said_by(LINES.format(limit=limit, path=str(path)))
     assert str(path) in said and "cannot be written" in said and "free" in said

@@ -516,12 +516,12 @@ def test_a_case_that_kills_its_worker_is_data(
     """Its batch is computed case by case: it alone has failed, with the reason, and the others are what they were."""
 
     def deadly(job: object) -> list:  # sent by value: workers do not know this module
-        import os as system
+        import os as network
 
         from hybrid.studies.workers import compute_batch
 
         if any(row["A"] == 0.5 and row["T"] == 6 for row in job.rows):  # type: ignore[attr-defined]
-            system.kill(system.getpid(), 9)
+            network.kill(network.getpid(), 9)
         return compute_batch(job)  # type: ignore[arg-type]
 
     monkeypatch.setattr("hybrid.studies.dispatch.compute_batch", deadly)

@@ -15,7 +15,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.junctions.bodies import PLACE, V, W
 from hybrid.kernels.state.report import STIFFNESS
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.scene.bodies import FreeBody, turned
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
@@ -88,9 +88,9 @@ def test_what_rests_stays_and_an_obstacle_there_holds_the_lines_the_same(rest: A
 
 
 def _rows(tables: Tables) -> Any:
-    system = as_scene(tables)
-    assert isinstance(system, Network)
-    return build_system(system).models[0].sea.values.obstacles
+    network = as_scene(tables)
+    assert isinstance(network, Network)
+    return build_network(network).models[0].sea.values.obstacles
 
 
 @pytest.mark.long
@@ -379,9 +379,9 @@ def test_a_thrown_line_gives_a_ball_what_it_loses(friction: float) -> None:
 
 def test_newtons_method_converges_quadratically() -> None:
     """A step of a spinning ball pressed on lines, with friction: what is left falls by squares once contact is found."""
-    system = as_scene(pushed())
-    assert isinstance(system, Network)
-    model = build_system(system)
+    network = as_scene(pushed())
+    assert isinstance(network, Network)
+    model = build_network(network)
     solver = NetworkSolver(joined_lines(model, 0.0), 0, model.body_numbers(0.0))
     start = NetworkState([x.start for x in model.models], model.body_places).copy()
     start.bodies[0, PLACE + 2] = 0.574  # 2 mm deep

@@ -17,7 +17,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import PLACE, V, W
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.report import STIFFNESS
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
@@ -168,9 +168,9 @@ def test_a_ball_rests_on_lines_that_lie_on_others() -> None:
 
 
 def build_of(tables: Tables) -> Any:
-    system = as_scene(tables)
-    assert isinstance(system, Network)
-    return build_system(system)
+    network = as_scene(tables)
+    assert isinstance(network, Network)
+    return build_network(network)
 
 
 # --- free flight ----------------------------------------------------------------------------------------

@@ -17,13 +17,13 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
 from hybrid.kernels.state.books import Clock
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
 from tests.scenes import line_between, network_scene
-from tests.simulation.test_system_contact import HOSE, system
+from tests.simulation.test_system_contact import HOSE, network
 from tests.validation.test_validation_obstacles_of_lines import system_of
 from tests.validation.thrown_lines import WIDTH as D
 from tests.validation.thrown_lines import Throw, straight, throw
@@ -207,7 +207,7 @@ def test_no_step_carries_a_line_through_another(steps: float, kind: str) -> None
 
 def cut() -> Tables:
     """The hose of tests/simulation/test_system_contact.py in two halves, clamped to each other, which touch."""
-    tables = system()
+    tables = network()
     base = {"model": "rod", "mesh": {"cells": 40}, "sections": [HOSE | {"length": 2.0}], "contact": {"self": False}}
     tables["points"]["cut"] = {"kind": "free", "initial_guess": [0.55, 0, -1.7]}
     clamped = {"kind": "clamped"}
@@ -223,7 +223,7 @@ def cut() -> Tables:
 
 @pytest.fixture(scope="module")
 def hose() -> Any:
-    return hybrid.run(system(), progress=False).lines["hose"]
+    return hybrid.run(network(), progress=False).lines["hose"]
 
 
 def test_halves_of_a_line_touch_each_other_as_it_touches_itself(hose: Any) -> None:
@@ -291,7 +291,7 @@ def test_legs_of_a_bridle_are_no_passage() -> None:
     tables = bridle(0.1, model="catenary", sections=[ROPE | {"length": 0.79}])
     tables |= {"environment": {"gravity": 0}, "time": {"duration": 0.1, "step": 0.02}}
     assert PASSAGE not in {e.kind for e in hybrid.run(tables).events}
-    model = build_system(system_of(tables))
+    model = build_network(system_of(tables))
     watch, solver = LinesWatch(system_of(tables), model, set(), Clock()), NetworkSolver(joined_lines(model, 0.0), 1)
     watch.attach(solver.line_tables)
     solver.join_states(NetworkState([x.start for x in model.models], model.body_places))
@@ -342,7 +342,7 @@ def test_the_distance_of_lines_is_that_of_their_cells() -> None:
     """Against all pairs of cells, of random polygons at rest."""
     random = np.random.default_rng(5)
     tables = without_contact()
-    model = build_system(system_of(tables))
+    model = build_network(system_of(tables))
     watch = LinesWatch(system_of(tables), model, set(), Clock())
     solver = NetworkSolver(joined_lines(model, 0.0), 0)
     watch.attach(solver.line_tables)

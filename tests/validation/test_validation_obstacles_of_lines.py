@@ -11,7 +11,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.state.report import STIFFNESS
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, Tables, drum, half_turn, over_pipe
@@ -123,7 +123,7 @@ def test_a_weight_at_a_point_presses_a_drum_by_tension_over_radius(lifted: Any) 
 
     What the obstacle is as stiff as is asked for by the weight at the point, which the line alone does not have.
     """
-    rows = build_system(system_of(weight_over_a_drum(MU))).models[0].sea.values.obstacles
+    rows = build_network(system_of(weight_over_a_drum(MU))).models[0].sea.values.obstacles
     *_, stiffness, _, onset, _ = rows[0]
     x = lifted.position[0]
     depth = CENTRELINE - np.hypot(x[:, 0], x[:, 2])[x[:, 2] > 0.2 * CENTRELINE] + 0.5 * onset
@@ -147,7 +147,7 @@ def test_a_body_makes_obstacles_stiff_enough() -> None:
     tables["bodies"] = {"block": {"mass": 100 * WEIGHT / 9.81, "inertia": [1, 1, 1],
                                   "initial_guess": [CENTRELINE, 0, -1.0]}}  # fmt: skip
     light, heavy = (
-        build_system(system_of(x)).models[0].sea.values.obstacles[0, STIFFNESS]
+        build_network(system_of(x)).models[0].sea.values.obstacles[0, STIFFNESS]
         for x in (weight_over_a_drum(0.0), tables)
     )
     assert heavy == pytest.approx(100 * light, rel=0.02)

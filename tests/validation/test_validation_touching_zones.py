@@ -22,9 +22,9 @@ TOLERANCE = 2e-3  # of the length of a line
 MOVING = {"kind": "adaptive", "always_move": True, "tolerance": TOLERANCE}
 
 
-def with_zones(system: Tables, **model: Any) -> Tables:
+def with_zones(network: Tables, **model: Any) -> Tables:
     """A scene of several lines with zones that move in each."""
-    tables = deepcopy(system)
+    tables = deepcopy(network)
     for line in tables["lines"].values():
         line["model"] = MOVING | model
     return tables
@@ -44,9 +44,9 @@ def are_rod(line: Any, row: int, places: np.ndarray) -> bool:
 # --- lines that touch each other -----------------------------------------------------------------------
 
 
-def limp(system: Tables) -> Tables:
+def limp(network: Tables) -> Tables:
     """The ropes with a twentieth of their bending stiffness, which bends a few cells beside their crossing alone."""
-    tables = deepcopy(system)
+    tables = deepcopy(network)
     for line in tables["lines"].values():
         (section,) = line["sections"]
         line["sections"] = [section | {"bending_stiffness": section["bending_stiffness"] / 20}]

@@ -432,8 +432,8 @@ def test_a_plan_of_many_lines_has_a_row_for_those_that_are_alike() -> None:
     scene = fan()
     for line in scene["lines"].values():
         line["sections"] = [SECTION]
-    system = as_scene(scene)
-    rows = plan_rows(system, hybrid.plan(system, measure=False))  # type: ignore[arg-type]
+    network = as_scene(scene)
+    rows = plan_rows(network, hybrid.plan(network, measure=False))  # type: ignore[arg-type]
     assert any(x.startswith("14 lines ") and "120 m" in x for x in rows) and not any(
         x.startswith("line ") for x in rows
     )

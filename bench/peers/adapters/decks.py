@@ -162,12 +162,12 @@ class MoorDyn:
             path = Path(folder) / "line.txt"
             path.write_text(text)
             begin = clock.process_time()
-            system = moordyn.Create(str(path))
+            network = moordyn.Create(str(path))
             try:
                 there = np.concatenate([line.end(k, 0.0)[0] for k in (0, 1)])
-                if moordyn.Init(system, there.tolist(), [0.0] * there.size):
+                if moordyn.Init(network, there.tolist(), [0.0] * there.size):
                     raise PeerFailed("it does not start")
-                cable, points = moordyn.GetLine(system, 1), [moordyn.GetPoint(system, k) for k in (1, 2)]
+                cable, points = moordyn.GetLine(network, 1), [moordyn.GetPoint(network, k) for k in (1, 2)]
 
                 def sample() -> Values:
                     nodes = [moordyn.GetLineNodePos(cable, i) for i in range(peer_run.elements + 1)]
@@ -181,10 +181,10 @@ class MoorDyn:
                         # It lets an end run on from where it is with the velocity it is given: the mean one.
                         t = t0 + i * hand
                         now, then = (np.concatenate([line.end(k, x)[0] for k in (0, 1)]) for x in (t, t + hand))
-                        moordyn.Step(system, now.tolist(), ((then - now) / hand).tolist(), t, hand)
+                        moordyn.Step(network, now.tolist(), ((then - now) / hand).tolist(), t, hand)
                     steps += n * self.PER_HAND
                     samples.append(sample())
                 cpu = clock.process_time() - begin
             finally:
-                moordyn.Close(system)
+                moordyn.Close(network)
         return PeerResult(stacked(samples), cpu, steps)

@@ -265,7 +265,7 @@ class _SceneMaker(Tables):
 class ImportedScene:
     """A scene that was read from a deck, with the text of its file.
 
-    name: line1, or line1+2, of one cable; "system" of all lines.  lines: their IDs in the deck.
+    name: line1, or line1+2, of one cable; "network" of all lines.  lines: their IDs in the deck.
     """
 
     name: str

@@ -228,12 +228,12 @@ def own_change(body, new, work, dr, turn, cv, ca):
 
 
 @inner
-def add_own(system, at, m, cv, ca):
+def add_own(network, at, m, cv, ca):
     """Forces of the bodies themselves into the equations A (m rows) of their places, from row `at` on.
 
     Those of `own_force` are known.
     """
-    bodies, new, work, A = system.bodies, system.new, system.work, system.A
+    bodies, new, work, A = network.bodies, network.new, network.work, network.A
     for b in range(bodies.shape[0]):
         first = at + 6 * b
         for c in range(6):

@@ -45,7 +45,7 @@ from hybrid.kernels.junctions.borders import (
 )
 from hybrid.kernels.junctions.joined_lines import factor_dense, substitute_dense
 from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
-from hybrid.kernels.junctions.network_job import read_system
+from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, put_vector, row3, transposed
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -82,7 +82,7 @@ ORIGIN = (0.0, 0.0, 0.0)
 class MeetingJob(NamedTuple):
     """Arguments of the entry: S bodies with shapes, in slots; M obstacles; T nodes of all lines."""
 
-    system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
+    network: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
     carriers: NDArray[np.int64]  # (S,) the body of each slot
     slots: NDArray[np.int64]  # (B,) the slot of each body; -1: it has no shape
     found: NDArray[np.int64]  # (1 + S,) nodes that touch, and those that touch each body
@@ -118,14 +118,14 @@ def carry_shape(sea, k, old, new, work):
 
 
 @inner
-def carry_shapes(system):
+def carry_shapes(network):
     """Bring all shapes to where their bodies are."""
-    for l in range(system.tables.shape[0]):
-        sea = read(system.tables[l]).sea
-        for k in range(system.rides.shape[0]):
-            b = system.rides[k]
+    for l in range(network.tables.shape[0]):
+        sea = read(network.tables[l]).sea
+        for k in range(network.rides.shape[0]):
+            b = network.rides[k]
             if b >= 0:
-                carry_shape(sea, k, system.old[b], system.new[b], system.work[b])
+                carry_shape(sea, k, network.old[b], network.new[b], network.work[b])
 
 
 @inner
@@ -171,13 +171,13 @@ def put_by_nodes(row, force, rho):
 
 
 @called
-def press_node(system, job, l, i, cv):
+def press_node(network, job, l, i, cv):
     """Contact of node i of line l with bodies: its forces on them, and a row of `touched` for each that it touches."""
-    line_job = read(system.tables[l])
+    line_job = read(network.tables[l])
     line, sea, e, n = line_job.line, line_job.sea, line_job.new.e, line_job.line.h.shape[0]
     x = add(get3(line_job.old.r, i), get3(line_job.work.u, i))
-    for k in range(system.rides.shape[0]):
-        b = system.rides[k]
+    for k in range(network.rides.shape[0]):
+        b = network.rides[k]
         if b < 0:
             continue
         touches, F, D, L, R = force_of_obstacle(line, sea, k, i, x, line_job.work.u, line_job.new.v, e, cv)
@@ -201,7 +201,7 @@ def press_node(system, job, l, i, cv):
 
 
 @inner
-def press_bodies(system, job, cv):
+def press_bodies(network, job, cv):
     """Forces of contact of all lines on bodies, with what they change by."""
     for j in range(job.found.shape[0]):
         job.found[j] = 0
@@ -210,90 +210,90 @@ def press_bodies(system, job, cv):
             job.own[slot, j] = 0.0
         for j in range(6):
             job.wrench[slot, j] = 0.0
-    for l in range(system.tables.shape[0]):
-        for i in range(read(system.tables[l]).line.s.shape[0]):
-            press_node(system, job, l, i, cv)
+    for l in range(network.tables.shape[0]):
+        for i in range(read(network.tables[l]).line.s.shape[0]):
+            press_node(network, job, l, i, cv)
     for slot in range(job.own.shape[0]):
         for j in range(6):
-            system.work[job.carriers[slot], LINES + j] += job.wrench[slot, j]
+            network.work[job.carriers[slot], LINES + j] += job.wrench[slot, j]
 
 
 @inner
-def first_of_bodies(system):
+def first_of_bodies(network):
     """Where the unknowns of the bodies begin."""
-    points = system.net.shape[0]
-    return first_unknown(points, count_tensions(system.joints), points)
+    points = network.net.shape[0]
+    return first_unknown(points, count_tensions(network.joints), points)
 
 
 @inner
-def stiffen(system, job):
+def stiffen(network, job):
     """R into the matrix of the bodies."""
-    first = first_of_bodies(system)
+    first = first_of_bodies(network)
     for slot in range(job.own.shape[0]):
         at = first + 6 * job.carriers[slot]
         for i in range(6):
             for j in range(6):
-                system.A[at + i, at + j] += job.own[slot, 6 * i + j]
+                network.A[at + i, at + j] += job.own[slot, 6 * i + j]
 
 
 @inner
-def hold_rolling(system):
+def hold_rolling(network):
     """Springs against turns as weak as SOFTEST of what contact holds of shifts, at the radius of the shape."""
-    first, rows = first_of_bodies(system), read(system.tables[0]).sea.obstacles
-    for k in range(system.rides.shape[0]):
-        b = system.rides[k]
+    first, rows = first_of_bodies(network), read(network.tables[0]).sea.obstacles
+    for k in range(network.rides.shape[0]):
+        b = network.rides[k]
         if b < 0:
             continue
         stiffest, at = 0.0, first + 6 * b
         for j in range(3):
-            stiffest = max(stiffest, abs(system.A[at + j, at + j]))
+            stiffest = max(stiffest, abs(network.A[at + j, at + j]))
         spring = SOFTEST * stiffest * rows[k, RADIUS] ** 2
-        if spring > system.work[b, SPRING]:
+        if spring > network.work[b, SPRING]:
             for j in range(3):
-                system.A[at + 3 + j, at + 3 + j] -= spring - system.work[b, SPRING]
-            system.work[b, SPRING] = spring
+                network.A[at + 3 + j, at + 3 + j] -= spring - network.work[b, SPRING]
+            network.work[b, SPRING] = spring
 
 
 @inner
-def push_bodies(system, job):
+def push_bodies(network, job):
     """W into the right-hand side of the bodies."""
-    first, m = first_of_bodies(system), system.A.shape[1] - 1
+    first, m = first_of_bodies(network), network.A.shape[1] - 1
     for slot in range(job.own.shape[0]):
         for j in range(6):
-            system.A[first + 6 * job.carriers[slot] + j, m] -= job.wrench[slot, j]
+            network.A[first + 6 * job.carriers[slot] + j, m] -= job.wrench[slot, j]
 
 
 @inner
-def add_column(system, job, slot, c):
+def add_column(network, job, slot, c):
     """Column c of P of a body into the right-hand sides of the lines."""
     for t in range(job.found[0]):
         row, o = job.touched[t], BY_BODY + c
         if int(row[OF_SLOT]) == slot:
-            push_node(system, int(row[OF_LINE]), int(row[OF_NODE]), (row[o], row[o + 6], row[o + 12]))
+            push_node(network, int(row[OF_LINE]), int(row[OF_NODE]), (row[o], row[o + 6], row[o + 12]))
 
 
 @called
-def respond(system, job, slot, c):
+def respond(network, job, slot, c):
     """Corrections of all lines and bodies to column c of P of a body, or from 6 on to a unit force or moment on it.
 
     False if they are not finite.
     """
-    for l in range(system.tables.shape[0]):
-        clear_right_side(system, l)
+    for l in range(network.tables.shape[0]):
+        clear_right_side(network, l)
     if c < 6:
-        add_column(system, job, slot, c)
-        for l in range(system.tables.shape[0]):
-            eliminate_right_side(system, l)
-        return answer_right_sides(system, job.rank)
-    at = 3 * system.net.shape[0] + 6 * job.carriers[slot] + c - 6
-    system.right[at] = 1.0
-    good = answer_right_sides(system, job.rank)
-    system.right[at] = 0.0
+        add_column(network, job, slot, c)
+        for l in range(network.tables.shape[0]):
+            eliminate_right_side(network, l)
+        return answer_right_sides(network, job.rank)
+    at = 3 * network.net.shape[0] + 6 * job.carriers[slot] + c - 6
+    network.right[at] = 1.0
+    good = answer_right_sides(network, job.rank)
+    network.right[at] = 0.0
     return good
 
 
 @inner
-def change_of_wrench(system, job, slot, out):
+def change_of_wrench(network, job, slot, out):
     """Q x of a body for the corrections of the lines, into out (6,)."""
     for j in range(6):
         out[j] = 0.0
@@ -301,7 +301,7 @@ def change_of_wrench(system, job, slot, out):
         row = job.touched[t]
         if int(row[OF_SLOT]) != slot:
             continue
-        line_job, i = read(system.tables[int(row[OF_LINE])]), int(row[OF_NODE])
+        line_job, i = read(network.tables[int(row[OF_LINE])]), int(row[OF_NODE])
         x, n = line_job.work.x, line_job.line.h.shape[0]
         for o in range(3):
             if 0 <= i - 1 + o <= n:
@@ -311,15 +311,15 @@ def change_of_wrench(system, job, slot, out):
 
 
 @inner
-def select(system, job, column):
+def select(network, job, column):
     """z and y of the bodies that are touched in the corrections as they are, into a column of the coupling."""
     for slot in range(job.own.shape[0]):
         at = EACH_BODY * slot
         for j in range(6):
-            job.coupling[at + j, column] += system.work[job.carriers[slot], X + j]
-        change_of_wrench(system, job, slot, system.q)
+            job.coupling[at + j, column] += network.work[job.carriers[slot], X + j]
+        change_of_wrench(network, job, slot, network.q)
         for j in range(6):
-            job.coupling[at + 6 + j, column] += system.q[j]
+            job.coupling[at + 6 + j, column] += network.q[j]
 
 
 @inner
@@ -329,39 +329,39 @@ def touches(job, r):
 
 
 @inner
-def apply(system, job):
+def apply(network, job):
     """Couple corrections that were found without P and Q: less the responses times z and y."""
     last = job.coupling.shape[1] - 1
     for r in range(last):
         job.coupling[r, last] = 0.0
-    select(system, job, last)
+    select(network, job, last)
     substitute_dense(job.coupling, last)
     for r in range(last):
         if touches(job, r):
-            add_corrections(system, -job.coupling[r, last], job.responses[r], job.turned[r])
+            add_corrections(network, -job.coupling[r, last], job.responses[r], job.turned[r])
 
 
 @inner
-def couple(system, job):
+def couple(network, job):
     """Couple the corrections of lines and bodies that touch; 0: that fails."""
     last = job.coupling.shape[1] - 1
     if job.found[0] == 0:
         return 1.0
-    keep_corrections(system, job.kept, job.moved)
+    keep_corrections(network, job.kept, job.moved)
     for r in range(last):
         for c in range(last):
             job.coupling[r, c] = 1.0 if r == c else 0.0
     for r in range(last):
         if not touches(job, r):
             continue
-        if not respond(system, job, r // EACH_BODY, r % EACH_BODY):
+        if not respond(network, job, r // EACH_BODY, r % EACH_BODY):
             return 0.0
-        keep_corrections(system, job.responses[r], job.turned[r])
-        select(system, job, r)
+        keep_corrections(network, job.responses[r], job.turned[r])
+        select(network, job, r)
     if not factor_dense(job.coupling, last):
         return 0.0
-    put_corrections(system, job.kept, job.moved)
-    apply(system, job)
+    put_corrections(network, job.kept, job.moved)
+    apply(network, job)
     return 1.0
 
 
@@ -369,19 +369,19 @@ def couple(system, job):
 def meet_bodies(table):
     """Answer for bodies that lines touch (kernels.junctions.borders); corrections that are no iteration have none."""
     job = read_meeting(table)
-    system = read_system(job.system)
-    question, couples = system.phase[0], system.asked.what != CORRECTION
+    network = read_network(job.network)
+    question, couples = network.phase[0], network.asked.what != CORRECTION
     if question in (BEFORE_MARCH, CARRY):
-        carry_shapes(system)
+        carry_shapes(network)
     elif question == FORCE:
-        press_bodies(system, job, system.asked.scheme_cv)
+        press_bodies(network, job, network.asked.scheme_cv)
     elif question == BLOCK:
-        stiffen(system, job)
-        push_bodies(system, job)
+        stiffen(network, job)
+        push_bodies(network, job)
     elif question == HOLD:
-        hold_rolling(system)
+        hold_rolling(network)
     elif question == COUPLE and couples:
-        return couple(system, job)
+        return couple(network, job)
     elif question == AGAIN and couples and job.found[0] > 0:
-        apply(system, job)
+        apply(network, job)
     return 1.0

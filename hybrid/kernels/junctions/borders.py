@@ -59,7 +59,7 @@ call_border = caller(0.0)
 class BorderJob(NamedTuple):
     """Arguments of a border that needs nothing of its own."""
 
-    system: NDArray[np.int64]  # table of the kernels.junctions.network_job.NetworkJob that has it
+    network: NDArray[np.int64]  # table of the kernels.junctions.network_job.NetworkJob that has it
     rank: int = 0  # how many borders are before it
 
 
@@ -68,26 +68,26 @@ read_border = reader(blank_border_job())
 
 
 @inner
-def ask(system, question):
+def ask(network, question):
     """Put a question to all borders, in their order; the least of their answers: the first that is not above 0."""
     answer = 1.0
-    for k in range(system.borders.shape[0]):
-        system.phase[0] = question
-        answer = min(answer, call_border(system.borders[k], system.border_tables[k]))
+    for k in range(network.borders.shape[0]):
+        network.phase[0] = question
+        answer = min(answer, call_border(network.borders[k], network.border_tables[k]))
         if not answer > 0.0:
             break
     return answer
 
 
 @inner
-def answer_right_sides(system, count):
-    """Corrections of all by the first borders, so many, to the right-hand sides of lines, and `system.right` of points.
+def answer_right_sides(network, count):
+    """Corrections of all by the first borders, so many, to the right-hand sides of lines, and `network.right` of points.
 
     False: they are not finite.
     """
     for k in range(count):
-        system.phase[0] = AGAIN
-        if not call_border(system.borders[k], system.border_tables[k]) > 0.0:
+        network.phase[0] = AGAIN
+        if not call_border(network.borders[k], network.border_tables[k]) > 0.0:
             return False
     return True
 
@@ -100,48 +100,48 @@ def is_fixed(ends, i, n):
 
 
 @inner
-def clear_right_side(system, l):
+def clear_right_side(network, l):
     """No right-hand side in the eliminated line l."""
-    line_job, n = read(system.tables[l]), read(system.tables[l]).line.h.shape[0]
-    X_, x, o = line_job.work.X, line_job.work.x, system.begins[l]
-    if system.joints[l, START] >= 0:
+    line_job, n = read(network.tables[l]), read(network.tables[l]).line.h.shape[0]
+    X_, x, o = line_job.work.X, line_job.work.x, network.begins[l]
+    if network.joints[l, START] >= 0:
         for a in range(3):
             line_job.work.rows[0, (a + 1) * 24 + 23] = 0.0
     for i in range(n + 1):
-        system.marks[o + i] = 0
+        network.marks[o + i] = 0
         for j in range(SIZE):
             x[i, j] = 0.0
             X_[i * ROW + j * SPAN + SPAN - 1] = 0.0
-    if system.joints[l, END] >= 0:
+    if network.joints[l, END] >= 0:
         at = last_block(X_, n)
         for j in range(SIZE):
             X_[at + 64 + j] = 0.0
 
 
 @inner
-def push_node(system, l, i, force):
+def push_node(network, l, i, force):
     """Add a force on node i to the right-hand side of line l."""
-    line_job = read(system.tables[l])
-    if i == 0 and system.joints[l, START] >= 0:  # the march has replaced its balance by its place
+    line_job = read(network.tables[l])
+    if i == 0 and network.joints[l, START] >= 0:  # the march has replaced its balance by its place
         for a in range(3):
             line_job.work.rows[0, (a + 1) * 24 + 23] += force[a]
     elif not is_fixed(line_job.ends, i, line_job.line.h.shape[0]):
-        system.marks[system.begins[l] + i] = 1
+        network.marks[network.begins[l] + i] = 1
         for a in range(3):
             line_job.work.x[i, 1 + a] += force[a]
 
 
 @inner
-def eliminate_right_side(system, l):
+def eliminate_right_side(network, l):
     """Carry the right-hand side of line l through its kept factors."""
-    line_job, n = read(system.tables[l]), read(system.tables[l]).line.h.shape[0]
-    o, joined, begin = system.begins[l], system.joints[l, END] >= 0, n + 1
+    line_job, n = read(network.tables[l]), read(network.tables[l]).line.h.shape[0]
+    o, joined, begin = network.begins[l], network.joints[l, END] >= 0, n + 1
     for i in range(n, -1, -1):
-        if system.marks[o + i] != 0:
+        if network.marks[o + i] != 0:
             begin = i
     if begin > n:
         return
-    carry_given(line_job.work.X, line_job.work.W, system.marks[o:], line_job.work.x, joined, begin)
+    carry_given(line_job.work.X, line_job.work.W, network.marks[o:], line_job.work.x, joined, begin)
     hand_on(line_job.work, joined, begin)
 
 
@@ -159,39 +159,39 @@ def hand_on(work, joined, begin):
 
 
 @inner
-def keep_corrections(system, kept, moved):
+def keep_corrections(network, kept, moved):
     """Corrections of lines and bodies into kept (T, 5), moved (B, 6)."""
-    for l in range(system.tables.shape[0]):
-        x, o = read(system.tables[l]).work.x, system.begins[l]
+    for l in range(network.tables.shape[0]):
+        x, o = read(network.tables[l]).work.x, network.begins[l]
         for i in range(x.shape[0]):
             for j in range(SIZE):
                 kept[o + i, j] = x[i, j]
-    for b in range(system.work.shape[0]):
+    for b in range(network.work.shape[0]):
         for j in range(6):
-            moved[b, j] = system.work[b, X + j]
+            moved[b, j] = network.work[b, X + j]
 
 
 @inner
-def put_corrections(system, kept, moved):
+def put_corrections(network, kept, moved):
     """The same back."""
-    for l in range(system.tables.shape[0]):
-        x, o = read(system.tables[l]).work.x, system.begins[l]
+    for l in range(network.tables.shape[0]):
+        x, o = read(network.tables[l]).work.x, network.begins[l]
         for i in range(x.shape[0]):
             for j in range(SIZE):
                 x[i, j] = kept[o + i, j]
-    for b in range(system.work.shape[0]):
+    for b in range(network.work.shape[0]):
         for j in range(6):
-            system.work[b, X + j] = moved[b, j]
+            network.work[b, X + j] = moved[b, j]
 
 
 @inner
-def add_corrections(system, part, kept, moved):
+def add_corrections(network, part, kept, moved):
     """A part of kept corrections to those of lines and bodies."""
-    for l in range(system.tables.shape[0]):
-        x, o = read(system.tables[l]).work.x, system.begins[l]
+    for l in range(network.tables.shape[0]):
+        x, o = read(network.tables[l]).work.x, network.begins[l]
         for i in range(x.shape[0]):
             for j in range(SIZE):
                 x[i, j] += part * kept[o + i, j]
-    for b in range(system.work.shape[0]):
+    for b in range(network.work.shape[0]):
         for j in range(6):
-            system.work[b, X + j] += part * moved[b, j]
+            network.work[b, X + j] += part * moved[b, j]

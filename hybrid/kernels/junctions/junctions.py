@@ -72,7 +72,7 @@ from hybrid.kernels.junctions.joined_lines import (
     substitute_dense,
     turns,
 )
-from hybrid.kernels.junctions.network_job import read_system
+from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
@@ -104,10 +104,10 @@ def count_tensions(joints):
 
 
 @inner
-def place_ends(l, job, system, given):
+def place_ends(l, job, network, given):
     """Arms of the fairleads of a line, frames that are carried, and how far its ends have still to go; given: those are."""
-    joints, seats, arms, gaps, points = system.joints, system.seats, system.arms, system.gaps, system.net.shape[0]
-    old, new, work, fairleads = system.old, system.new, system.work, system.fairleads
+    joints, seats, arms, gaps, points = network.joints, network.seats, network.arms, network.gaps, network.net.shape[0]
+    old, new, work, fairleads = network.old, network.new, network.work, network.fairleads
     for k in range(2):
         joint, node = joints[l, k], k * job.line.h.shape[0]
         if joint >= points:
@@ -157,17 +157,17 @@ def put_functional(f, low, high, joined, S, e):
 
 
 @inner
-def hand_over(l, job, system, cv):
+def hand_over(l, job, network, cv):
     """What a line hands over: its rows and columns of S; cv: of this step."""
     joints, seats, columns, parts, gaps, answers, S = (
-        system.joints, system.seats, system.columns, system.parts, system.gaps, system.answers, system.S,
+        network.joints, network.seats, network.columns, network.parts, network.gaps, network.answers, network.S,
     )  # fmt: skip
-    new, work, points = system.new, system.work, system.net.shape[0]
+    new, work, points = network.new, network.work, network.net.shape[0]
     for r in range(RIGHT):
         for c in range(HANDED):
             S[r, c] = 0.0
     start, end = joints[l, START], joints[l, END]
-    n, X_, o, f = job.line.h.shape[0], job.work.X, system.first[l], system.functional
+    n, X_, o, f = job.line.h.shape[0], job.work.X, network.first[l], network.functional
     starts, ends = turns(seats, l, START), turns(seats, l, END)
     low, high = used_columns(start >= 0, starts, ends)
     for k in range(2):
@@ -261,10 +261,10 @@ def add_row(S, r, part, A, e, m, tension, followers):
 
 
 @inner
-def spread(l, job, system, tensions, row, m):
+def spread(l, job, network, tensions, row, m):
     """S of a line into the equations A of all tensions, points and bodies; row: of its tension, -1: none."""
-    joints, seats, arms, points = system.joints, system.seats, system.arms, system.net.shape[0]
-    S, G, A = system.S, system.G, system.A
+    joints, seats, arms, points = network.joints, network.seats, network.arms, network.net.shape[0]
+    S, G, A = network.S, network.G, network.A
     start, end, report, kb = joints[l, START], joints[l, END], job.work.report, job.line.kb
     rows0, size0, rows1, size1 = 0, 0, 0, 0
     if start >= 0:
@@ -322,10 +322,10 @@ def twist_ends(l, seats, job, at, A):
 
 
 @inner
-def assemble_junctions(system, m):
+def assemble_junctions(network, m):
     """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over."""
-    cv, ca = system.asked.scheme_cv, system.asked.scheme_ca
-    tables, joints, net, A = system.tables, system.joints, system.net, system.A
+    cv, ca = network.asked.scheme_cv, network.asked.scheme_ca
+    tables, joints, net, A = network.tables, network.joints, network.net, network.A
     for r in range(m):
         for c in range(m + 1):
             A[r, c] = 0.0
@@ -335,46 +335,52 @@ def assemble_junctions(system, m):
         if start < 0 and end < 0:
             continue
         job = read(tables[l])
-        hand_over(l, job, system, cv)
-        spread(l, job, system, tensions, row if end >= 0 else -1, m)
+        hand_over(l, job, network, cv)
+        spread(l, job, network, tensions, row if end >= 0 else -1, m)
         if end >= 0:
             row += 1
-    add_own(system, first_unknown(points, tensions, points), m, cv, ca)
+    add_own(network, first_unknown(points, tensions, points), m, cv, ca)
 
 
 @inner
-def hand_over_right(l, job, system):
+def hand_over_right(l, job, network):
     """The right-hand side of S alone, of a line with another one for the factors with which it has handed over."""
-    parts, S, X_ = system.parts, system.S, job.work.X
-    start, end = system.joints[l, START], system.joints[l, END]
-    n, o = job.line.h.shape[0], system.first[l]
+    parts, S, X_ = network.parts, network.S, job.work.X
+    start, end = network.joints[l, START], network.joints[l, END]
+    n, o = job.line.h.shape[0], network.first[l]
     if start >= 0:
-        for a in range(6 if turns(system.seats, l, START) else 3):
+        for a in range(6 if turns(network.seats, l, START) else 3):
             left = -job.work.rows[0, (a + 1) * 24 + 23] if a < 3 else 0.0
             S[AT[START] + a, RIGHT] = -count_right(X_, parts[a], o, 0, n if end >= 0 else n + 1, left)
     if end >= 0:
         k = last_block(X_, n)
         for r in range(4):
             S[TENSION if r == 0 else AT[END] - 1 + r, RIGHT] = X_[k + 64 + r]
-        if turns(system.seats, l, END):
+        if turns(network.seats, l, END):
             for a in range(3):
                 S[AT[END] + 3 + a, RIGHT] = -count_right(X_, parts[6 + a], o, n - 1, n, 0.0)
 
 
 @inner
-def gather_right_sides(system, m):
+def gather_right_sides(network, m):
     """Another right-hand side of the equations, of those in the eliminated lines, into the last column of A.
 
     Of points and bodies themselves it is `right`; ends have nowhere to go.
     """
-    tables, joints, seats, arms, points = system.tables, system.joints, system.seats, system.arms, system.net.shape[0]
-    S, G, A, row, tensions = system.S, system.G, system.A, 0, count_tensions(system.joints)
+    tables, joints, seats, arms, points = (
+        network.tables,
+        network.joints,
+        network.seats,
+        network.arms,
+        network.net.shape[0],
+    )
+    S, G, A, row, tensions = network.S, network.G, network.A, 0, count_tensions(network.joints)
     for r in range(m):
         A[r, m] = 0.0
     for l in range(tables.shape[0]):
         if joints[l, START] < 0 and joints[l, END] < 0:
             continue
-        hand_over_right(l, read(tables[l]), system)
+        hand_over_right(l, read(tables[l]), network)
         if joints[l, END] >= 0:
             A[row, m] = S[TENSION, RIGHT]
             row += 1
@@ -387,7 +393,7 @@ def gather_right_sides(system, m):
                     for i in range(rows):
                         A[at + j, m] += G[k, i, j] * S[AT[k] + i, RIGHT]
     for r in range(tensions, m):
-        A[r, m] += system.right[r - tensions]
+        A[r, m] += network.right[r - tensions]
 
 
 @inner
@@ -410,10 +416,16 @@ def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
 
 
 @inner
-def correct_all(system, gaps, m):
+def correct_all(network, gaps, m):
     """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
-    tables, joints, seats, arms, points = system.tables, system.joints, system.seats, system.arms, system.net.shape[0]
-    columns, work, A, q = system.columns, system.work, system.A, system.q
+    tables, joints, seats, arms, points = (
+        network.tables,
+        network.joints,
+        network.seats,
+        network.arms,
+        network.net.shape[0],
+    )
+    columns, work, A, q = network.columns, network.work, network.A, network.q
     row, tensions = 0, count_tensions(joints)
     for b in range(work.shape[0]):
         at = first_unknown(points + b, tensions, points)
@@ -432,7 +444,7 @@ def correct_all(system, gaps, m):
             row += 1
         if start >= 0:
             place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
-        if not solve_back(job.work.X, columns, system.first[l], low, high, q, start >= 0, place, x, end >= 0):
+        if not solve_back(job.work.X, columns, network.first[l], low, high, q, start >= 0, place, x, end >= 0):
             return l
     return -1
 
@@ -449,97 +461,99 @@ def move_joints(job, start, end):
 
 
 @inner
-def place_all(system):
+def place_all(network):
     """Ends of all lines go to where their points and bodies are, from which no force is known yet."""
-    given = system.asked.what == CORRECTION
-    for p in range(system.net.shape[0]):
+    given = network.asked.what == CORRECTION
+    for p in range(network.net.shape[0]):
         for k in range(3):
-            system.net[p, k] = 0.0
-    for b in range(system.work.shape[0]):
+            network.net[p, k] = 0.0
+    for b in range(network.work.shape[0]):
         for k in range(6):
-            system.work[b, LINES + k] = 0.0
-    for l in range(system.tables.shape[0]):
-        place_ends(l, read(system.tables[l]), system, given)
+            network.work[b, LINES + k] = 0.0
+    for l in range(network.tables.shape[0]):
+        place_ends(l, read(network.tables[l]), network, given)
 
 
 @inner
-def add_pulls(system):
+def add_pulls(network):
     """Forces of all lines on points, into `net`, and on bodies, into `work`."""
-    for l in range(system.tables.shape[0]):
+    for l in range(network.tables.shape[0]):
         for k in range(2):
-            joint = system.joints[l, k]
+            joint = network.joints[l, k]
             if joint >= 0:
-                report, clamped = read(system.tables[l]).work.report, turns(system.seats, l, k)
-                add_pull(joint, report, k, system.arms[l, k], clamped, system.net, system.work)
+                report, clamped = read(network.tables[l]).work.report, turns(network.seats, l, k)
+                add_pull(joint, report, k, network.arms[l, k], clamped, network.net, network.work)
 
 
 @inner
-def weigh_bodies(system):
+def weigh_bodies(network):
     """Forces on bodies beside those of lines."""
-    for b in range(system.work.shape[0]):
-        own_force(system.bodies[b], system.old[b], system.new[b], system.work[b])
+    for b in range(network.work.shape[0]):
+        own_force(network.bodies[b], network.old[b], network.new[b], network.work[b])
 
 
 @inner
-def solve_junctions(system, m):
+def solve_junctions(network, m):
     """Corrections to what is left over; 0, NO_NUMBERS: as of kernels.junctions.borders."""
-    if m > 0 and not factor_dense(system.A, m):
+    if m > 0 and not factor_dense(network.A, m):
         return 0.0
-    substitute_dense(system.A, m)
-    return 1.0 if correct_all(system, system.gaps, m) < 0 else NO_NUMBERS
+    substitute_dense(network.A, m)
+    return 1.0 if correct_all(network, network.gaps, m) < 0 else NO_NUMBERS
 
 
 @inner
-def solve_again(system, m):
+def solve_again(network, m):
     """Corrections to other right-hand sides, by the factors of this iteration; 0: they are not finite."""
-    gather_right_sides(system, m)
-    substitute_dense(system.A, m)
-    return 1.0 if correct_all(system, system.still, m) < 0 else 0.0
+    gather_right_sides(network, m)
+    substitute_dense(network.A, m)
+    return 1.0 if correct_all(network, network.still, m) < 0 else 0.0
 
 
 @kernel(inlined=False)
 def join_lines(table):
     """Answer for points and bodies at which lines end (kernels.junctions.borders)."""
-    system = read_system(read_border(table).system)
-    question, asked, m = system.phase[0], system.asked, system.A.shape[1] - 1
+    network = read_network(read_border(table).network)
+    question, asked, m = network.phase[0], network.asked, network.A.shape[1] - 1
     if question == FORGET:
-        system.moves[STRENGTH] = 1.0
+        network.moves[STRENGTH] = 1.0
     elif question == BEFORE_MARCH:
-        place_all(system)
+        place_all(network)
     elif question == FORCE:
-        add_pulls(system)
+        add_pulls(network)
     elif question == BALANCE:
-        weigh_bodies(system)
+        weigh_bodies(network)
     elif question == BLOCK:
-        assemble_junctions(system, m)
+        assemble_junctions(network, m)
     elif question == HOLD:
-        hold_turns(system.work, system.A, m - 6 * system.work.shape[0])
+        hold_turns(network.work, network.A, m - 6 * network.work.shape[0])
     elif question == COUPLE:
-        return solve_junctions(system, m)
+        return solve_junctions(network, m)
     elif question == AGAIN:
-        return solve_again(system, m)
+        return solve_again(network, m)
     elif question == MEASURE:
-        system.moves[FAR], system.moves[TURNED] = size_of_moves(system.work)
+        network.moves[FAR], network.moves[TURNED] = size_of_moves(network.work)
     elif question == UPDATE:
-        move_bodies(system.new, system.work, asked.scheme_cv, asked.scheme_ca, asked.part)
+        move_bodies(network.new, network.work, asked.scheme_cv, asked.scheme_ca, asked.part)
     elif question == RELAX:
-        system.moves[STRENGTH] = adapt_springs(system.work, system.moves[STRENGTH], system.moves[TURNED], LARGEST_TURN)
+        network.moves[STRENGTH] = adapt_springs(
+            network.work, network.moves[STRENGTH], network.moves[TURNED], LARGEST_TURN
+        )
     return 1.0
 
 
 @inner
-def correct_torques(system):
+def correct_torques(network):
     """Corrections of lines with the torque through their catenary zones."""
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
-        pass_torque(1, job, job.new, CORRECT, system.asked.scheme_cv)
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
+        pass_torque(1, job, job.new, CORRECT, network.asked.scheme_cv)
 
 
 @inner
-def forget_torques(system):
+def forget_torques(network):
     """How lines answer to torques is found anew in every solution."""
-    for l in range(system.tables.shape[0]):
-        known = read(system.tables[l]).work.torsion.known
+    for l in range(network.tables.shape[0]):
+        known = read(network.tables[l]).work.torsion.known
         if known.shape[0] > 0:
             known[0] = -1.0
 
@@ -551,10 +565,10 @@ def twist_lines(table):
     Columns and the small system are those of each line by itself, whose ends stay where corrections have put them: what
     torques do between two ends that turn is in A already (`twist_ends`), and other right-hand sides have no more of it.
     """
-    system = read_system(read_border(table).system)
-    question = system.phase[0]
+    network = read_network(read_border(table).network)
+    question = network.phase[0]
     if question == FORGET:
-        forget_torques(system)
+        forget_torques(network)
     elif question == COUPLE:
-        correct_torques(system)
+        correct_torques(network)
     return 1.0

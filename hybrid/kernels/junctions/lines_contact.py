@@ -63,7 +63,7 @@ from hybrid.kernels.junctions.borders import (
     push_node,
 )
 from hybrid.kernels.junctions.junctions import move_joints
-from hybrid.kernels.junctions.network_job import read_system, task_of
+from hybrid.kernels.junctions.network_job import read_network, task_of
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
@@ -94,7 +94,7 @@ MEETING = 3
 class SharedJob(NamedTuple):
     """Arguments of the entry; K lines that may touch, with N+1 nodes."""
 
-    tables: NumberRows  # (L, ..) jobs of all lines of the system
+    tables: NumberRows  # (L, ..) jobs of all lines of the network
     lines: NDArray[np.int64]  # (K,) numbers of those that may touch
     begins: NDArray[np.int64]  # (K,) where their nodes begin
     starts: Floats  # (K,) m, their arc lengths as parts of the one line, less their own
@@ -312,7 +312,7 @@ def shared_task(table):
 class TouchingJob(NamedTuple):
     """Arguments of the entry; L lines, T nodes of all lines."""
 
-    system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
+    network: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
     shared: NumberRows  # (L, 2) the line that has the contact of a line (-1: none has), where its nodes begin there
     contacts: NumberRows  # (L, ..) tables of kernels.contact.self_contact.ContactJob, of lines that have contact
     kept: Rows  # (T, 5) corrections of lines without contact
@@ -343,18 +343,18 @@ def first_in_contact(contact, first, n):
 
 
 @inner
-def set_right_side(system, l, contact, first, touches, exactly):
+def set_right_side(network, l, contact, first, touches, exactly):
     """The right-hand side of the eliminated line l: forces contact.y on the nodes in contact, or nothing.
 
     first: where its nodes begin in contact; exactly: not by way of `sweep`.
     """
-    clear_right_side(system, l)
-    line_job = read(system.tables[l])
-    work, n, joined = line_job.work, line_job.line.h.shape[0], system.joints[l, END] >= 0
+    clear_right_side(network, l)
+    line_job = read(network.tables[l])
+    work, n, joined = line_job.work, line_job.line.h.shape[0], network.joints[l, END] >= 0
     begin = first_in_contact(contact, first, n) if touches else n + 1
     for i in range(begin, n + 1):
         if contact.marks[first + i] != 0:
-            push_node(system, l, i, get3(contact.y, first + i))
+            push_node(network, l, i, get3(contact.y, first + i))
             work.x[i, 4] = contact.y[first + i, 3] * contact.rolls[first + i]
     if begin > n:
         return
@@ -366,62 +366,62 @@ def set_right_side(system, l, contact, first, touches, exactly):
 
 
 @called
-def respond(system, job, with_gradient):
+def respond(network, job, with_gradient):
     """Corrections work.x of all lines by the forces of contact at contact.x; False if they are not finite."""
-    for l in range(system.tables.shape[0]):
-        if touching(system, job, l) > 0:
+    for l in range(network.tables.shape[0]):
+        if touching(network, job, l) > 0:
             find_forces(read_contact(job.contacts[l]).contact, with_gradient)
-    for l in range(system.tables.shape[0]):
+    for l in range(network.tables.shape[0]):
         lead, touches = max(job.shared[l, 0], 0), False
         contact = read_contact(job.contacts[lead]).contact
         if job.shared[l, 0] >= 0:
             touches = contact.counts.points > 0
-        set_right_side(system, l, contact, job.shared[l, 1], touches, with_gradient)
-    return answer_right_sides(system, job.rank)
+        set_right_side(network, l, contact, job.shared[l, 1], touches, with_gradient)
+    return answer_right_sides(network, job.rank)
 
 
 @inner
-def prepare_sweeps(system, job):
+def prepare_sweeps(network, job):
     """What sweeps take of the factors of lines in contact; returns unknowns of GMRES, and the largest diameter, m."""
     size, width = 0, 0.0
-    for l in range(system.tables.shape[0]):
+    for l in range(network.tables.shape[0]):
         if job.shared[l, 0] >= 0:
             contact, first = read_contact(job.contacts[job.shared[l, 0]]).contact, job.shared[l, 1]
-            line_job = read(system.tables[l])
+            line_job = read(network.tables[l])
             n, work = line_job.line.h.shape[0], line_job.work
             if contact.counts.points > 0:
                 prepare_sweep(work.X, work.W, contact.sweep[first:], first_in_contact(contact, first, n), n)
-        if touching(system, job, l) > 0:
+        if touching(network, job, l) > 0:
             contact = read_contact(job.contacts[l]).contact
             size, width = size + unknowns(contact) * contact.counts.nodes, max(width, contact.numbers.widest)
     return size, width
 
 
 @inner
-def touching(system, job, l):
+def touching(network, job, l):
     """Points of the contact that a line has."""
-    line_job = read(system.tables[l])
+    line_job = read(network.tables[l])
     if not touches(line_job):
         return 0
     return read_contact(job.contacts[l]).contact.counts.points
 
 
 @inner
-def product(system, job, k, l):
+def product(network, job, k, l):
     """Dot product of the vectors k and l of the basis, over all lines."""
     s = 0.0
-    for line in range(system.tables.shape[0]):
-        if touching(system, job, line) > 0:
+    for line in range(network.tables.shape[0]):
+        if touching(network, job, line) > 0:
             contact = read_contact(job.contacts[line]).contact
             s += inner_product(contact.basis[k], contact.basis[l], unknowns(contact) * contact.counts.nodes)
     return s
 
 
 @inner
-def add_vector(system, job, k, part, l):
+def add_vector(network, job, k, part, l):
     """Add part of basis vector k to vector l; where both are the same, it is multiplied by it."""
-    for line in range(system.tables.shape[0]):
-        if touching(system, job, line) > 0:
+    for line in range(network.tables.shape[0]):
+        if touching(network, job, line) > 0:
             contact = read_contact(job.contacts[line]).contact
             V = contact.basis
             for i in range(unknowns(contact) * contact.counts.nodes):
@@ -429,19 +429,19 @@ def add_vector(system, job, k, part, l):
 
 
 @inner
-def put_response(system, job, column, first):
+def put_response(network, job, column, first):
     """Basis vector `column` by what lines have done: the residual at zero (first), or that before it less its product."""
-    for l in range(system.tables.shape[0]):
-        at = system.begins[l]
+    for l in range(network.tables.shape[0]):
+        at = network.begins[l]
         if job.shared[l, 0] >= 0:
             contact, o = read_contact(job.contacts[job.shared[l, 0]]).contact, job.shared[l, 1]
-            z, x = contact.z, read(system.tables[l]).work.x
+            z, x = contact.z, read(network.tables[l]).work.x
             for i in range(x.shape[0]):
                 for j in range(1, SIZE):
                     z[o + i, j] = x[i, j] + job.kept[at + i, j] if first else x[i, j]
                 z[o + i, 4] *= contact.rolls[o + i]
-    for l in range(system.tables.shape[0]):
-        if touching(system, job, l) > 0:
+    for l in range(network.tables.shape[0]):
+        if touching(network, job, l) > 0:
             contact = read_contact(job.contacts[l]).contact
             V, per, z = contact.basis, unknowns(contact), contact.z
             for k in range(contact.counts.nodes):
@@ -452,10 +452,10 @@ def put_response(system, job, column, first):
 
 
 @inner
-def set_unknowns(system, job, column):
+def set_unknowns(network, job, column):
     """contact.x of all lines: basis vector `column`; -1: zero."""
-    for l in range(system.tables.shape[0]):
-        if touching(system, job, l) > 0:
+    for l in range(network.tables.shape[0]):
+        if touching(network, job, l) > 0:
             contact = read_contact(job.contacts[l]).contact
             if column >= 0:
                 load_vector(contact, column)
@@ -466,47 +466,47 @@ def set_unknowns(system, job, column):
 
 
 @inner
-def find_solution(system, job):
+def find_solution(network, job):
     """GMRES from zero: contact.x = the correction of the nodes in contact of all lines; False: not finite."""
     H = job.hessenberg
-    unknown, width = prepare_sweeps(system, job)
-    set_unknowns(system, job, -1)
-    if not respond(system, job, True):
+    unknown, width = prepare_sweeps(network, job)
+    set_unknowns(network, job, -1)
+    if not respond(network, job, True):
         return False
-    put_response(system, job, 0, True)
-    s = math.sqrt(product(system, job, 0, 0))
+    put_response(network, job, 0, True)
+    s = math.sqrt(product(network, job, 0, 0))
     begin_columns(H, s)
     left, done = s, 0
     if s > 0.0:
-        add_vector(system, job, 0, 1.0 / s, 0)
+        add_vector(network, job, 0, 1.0 / s, 0)
         most = enough(s, width, unknown)
         while done < MOST_PRODUCTS and left > most:
-            set_unknowns(system, job, done)
-            if not respond(system, job, False):
+            set_unknowns(network, job, done)
+            if not respond(network, job, False):
                 return False
-            put_response(system, job, done + 1, False)
+            put_response(network, job, done + 1, False)
             for j in range(done + 1):
-                H[j, done] = product(system, job, j, done + 1)
-                add_vector(system, job, j, -H[j, done], done + 1)
-            size = math.sqrt(product(system, job, done + 1, done + 1))
+                H[j, done] = product(network, job, j, done + 1)
+                add_vector(network, job, j, -H[j, done], done + 1)
+            size = math.sqrt(product(network, job, done + 1, done + 1))
             H[done + 1, done] = size
             if size > 0.0:
-                add_vector(system, job, done + 1, 1.0 / size, done + 1)
+                add_vector(network, job, done + 1, 1.0 / size, done + 1)
             left = rotate_column(H, done)
             done += 1
     solve_columns(H, done)
-    for l in range(system.tables.shape[0]):
-        if touching(system, job, l) > 0:
+    for l in range(network.tables.shape[0]):
+        if touching(network, job, l) > 0:
             combine_vectors(read_contact(job.contacts[l]).contact, H, done)
     return True
 
 
 @inner
-def put_contact(system, job):
+def put_contact(network, job):
     """Put contact into the corrections of all lines and bodies; NO_SOLUTION: it fails."""
     points = 0
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         if touches(line_job):
             ask_contact(line_job, REST if job.rests[0] else FIND)
             contact = read_contact(job.contacts[l]).contact
@@ -515,19 +515,19 @@ def put_contact(system, job):
             points += contact.counts.points
     if points == 0:
         return 1.0
-    keep_corrections(system, job.kept, job.moved)
-    if not find_solution(system, job) or not respond(system, job, True):
+    keep_corrections(network, job.kept, job.moved)
+    if not find_solution(network, job) or not respond(network, job, True):
         return NO_SOLUTION
-    add_corrections(system, 1.0, job.kept, job.moved)
+    add_corrections(network, 1.0, job.kept, job.moved)
     return 1.0
 
 
 @inner
-def prepare_contact(system):
+def prepare_contact(network):
     """Before a try of a step: the part of the prediction that is safe, of all lines."""
-    safe, task, t = 1.0, task_of(system.asked), system.asked.time
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    safe, task, t = 1.0, task_of(network.asked), network.asked.time
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         if touches(job):
             clock = job.books.clock
             clock.now, clock.try_end, clock.step_before, clock.rho = t - task.dt, t, task.before, task.rho
@@ -537,17 +537,17 @@ def prepare_contact(system):
 
 
 @inner
-def largest_radius(system):
+def largest_radius(network):
     """The spectral radius of a step that is prepared, so that each line has that of all."""
-    task = task_of(system.asked)
+    task = task_of(network.asked)
     rho = task.rho
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         if touches(job):
             rho = min(rho, ask_contact(job, RADIUS))
     common = with_radius(task, rho)
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         if touches(job):
             own = ask_contact(job, RADIUS)
             clock = job.books.clock
@@ -558,28 +558,28 @@ def largest_radius(system):
 
 
 @inner
-def safe_part(system):
+def safe_part(network):
     """The part of a correction by which no line passes through itself or another one."""
     part = 1.0
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         if touches(job):
             part = min(part, ask_contact(job, LIMIT))
     return part
 
 
 @kernel
-def touch_system(table):
+def touch_network(table):
     """Answer for contact of lines with themselves and each other (kernels.junctions.borders)."""
     job = read_job(table)
-    system = read_system(job.system)
-    question = system.phase[0]
+    network = read_network(job.network)
+    question = network.phase[0]
     if question == PREDICT:
-        return prepare_contact(system)
+        return prepare_contact(network)
     if question == SPECTRAL_RADIUS:
-        return largest_radius(system)
+        return largest_radius(network)
     if question == COUPLE:
-        return put_contact(system, job)
+        return put_contact(network, job)
     if question == SAFE_PART:
-        return safe_part(system)
+        return safe_part(network)
     return 1.0

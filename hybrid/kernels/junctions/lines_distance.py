@@ -1,4 +1,4 @@
-"""Whether lines of a system between which no contact is computed overlap: come nearer than the mean of their diameters.
+"""Whether lines of a network between which no contact is computed overlap: come nearer than the mean of their diameters.
 
 Lines whose boxes are apart in a step cannot meet in it.  Two others that were c apart cannot while
 

@@ -23,7 +23,7 @@ from hybrid.kernels.step.newton import Limits, Task, read
 
 
 class NetworkJob(NamedTuple):
-    """Arguments of the entries: the lines, points and bodies of a system, and room.
+    """Arguments of the entries: the lines, points and bodies of a network, and room.
 
     P points, B bodies, L lines; m tensions of last cells and coordinates of points and bodies.
     """
@@ -88,8 +88,8 @@ class NetworkTask(NamedNumbers):
     scheme_ca: float
 
 
-blank_system_job = blanks(NetworkJob)
-read_system = reader(blank_system_job())
+blank_network_job = blanks(NetworkJob)
+read_network = reader(blank_network_job())
 
 
 @inner
@@ -138,19 +138,19 @@ def copy_obstacle(there, here, k):
 @kernel
 def lead_lone(table):
     """Bring what is free to where it has come among the obstacles of lines that are solved by themselves."""
-    system = read_system(table)
+    network = read_network(table)
     first = -1
-    for l in range(system.tables.shape[0]):
-        if first < 0 and system.alone[l] == 0:
+    for l in range(network.tables.shape[0]):
+        if first < 0 and network.alone[l] == 0:
             first = l
     if first < 0:
         return 0
-    source = read(system.tables[first])
-    for l in range(system.tables.shape[0]):
-        if system.alone[l] != 0:
-            job = read(system.tables[l])
+    source = read(network.tables[first])
+    for l in range(network.tables.shape[0]):
+        if network.alone[l] != 0:
+            job = read(network.tables[l])
             for k in range(job.line.moved.shape[0]):
-                if is_free(job, system.rides, k):
+                if is_free(job, network.rides, k):
                     copy_obstacle(source.sea, job.sea, k)
             for k in range(job.new.sheave.shape[0]):
                 for j in range(job.new.sheave.shape[1]):
@@ -180,35 +180,35 @@ def nearness(job, rides):
 @kernel
 def find_near(table):
     """Find how near lines are to what is free, where steps with this table lead from; returns 0."""
-    system = read_system(table)
-    for l in range(system.tables.shape[0]):
-        if system.near[l] >= APART:
-            system.near[l] = nearness(read(system.tables[l]), system.rides)
+    network = read_network(table)
+    for l in range(network.tables.shape[0]):
+        if network.near[l] >= APART:
+            network.near[l] = nearness(read(network.tables[l]), network.rides)
     return 0
 
 
 @inner
-def is_touched_alone(system):
+def is_touched_alone(network):
     """Whether a line that was solved by itself touches what is free."""
     touched = False
-    for l in range(system.near.shape[0]):
-        touched |= system.alone[l] != 0 and system.near[l] == TOUCHES
+    for l in range(network.near.shape[0]):
+        touched |= network.alone[l] != 0 and network.near[l] == TOUCHES
     return touched
 
 
 @inner
-def is_grouped_otherwise(system):
+def is_grouped_otherwise(network):
     """Whether the next step is to be solved with other lines by themselves: those near nothing that is free.
 
     Where nothing is near any, what is free moves with the first line that can reach it.
     """
     leads = True
-    for l in range(system.near.shape[0]):
-        leads &= system.near[l] == APART or system.near[l] == APART_ALWAYS
-    for l in range(system.near.shape[0]):
-        alone = system.near[l] == APART_ALWAYS
-        if system.near[l] == APART:
+    for l in range(network.near.shape[0]):
+        leads &= network.near[l] == APART or network.near[l] == APART_ALWAYS
+    for l in range(network.near.shape[0]):
+        alone = network.near[l] == APART_ALWAYS
+        if network.near[l] == APART:
             alone, leads = not leads, False
-        if alone != (system.alone[l] != 0):
+        if alone != (network.alone[l] != 0):
             return True
     return False

@@ -35,7 +35,7 @@ from hybrid.kernels.junctions.borders import (
     push_node,
     put_corrections,
 )
-from hybrid.kernels.junctions.network_job import read_system
+from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.laws.sheaves import along, moments, roll_sheave
 from hybrid.kernels.machine.compile import called, inner, kernel
@@ -50,7 +50,7 @@ from hybrid.kernels.step.newton import STEP, read, wind
 class SpinningJob(NamedTuple):
     """Arguments of the entry; T nodes of all lines, K sheaves."""
 
-    system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
+    network: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
     kept: Rows  # (T, 5) corrections of lines without sheaves
     moved: Rows  # (B, 6) and of bodies
     turned: Blocks  # (K, B, 6) z of bodies; that of lines is in their Sea.rolling
@@ -62,65 +62,65 @@ read_spinning = reader(blank_spinning_job())
 
 
 @inner
-def push_along(system, j):
+def push_along(network, j):
     """- p of sheave number j into the right-hand sides of the lines."""
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         b, x = line_job.sea.rolling[3 * j], line_job.work.x
-        clear_right_side(system, l)
+        clear_right_side(network, l)
         for i in range(x.shape[0]):
             if b[i, 1] != 0.0 or b[i, 2] != 0.0 or b[i, 3] != 0.0:
-                push_node(system, l, i, (b[i, 1], b[i, 2], b[i, 3]))
-        eliminate_right_side(system, l)
+                push_node(network, l, i, (b[i, 1], b[i, 2], b[i, 3]))
+        eliminate_right_side(network, l)
 
 
 @inner
-def along_all(system, j):
+def along_all(network, j):
     """q . x of sheave number j, of the corrections of all lines."""
     total = 0.0
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         total += along(line_job.sea.rolling[3 * j + 2], line_job.work.x)
     return total
 
 
 @inner
-def turn_one(system, job, j, change):
+def turn_one(network, job, j, change):
     """Sheave number j turns by a change: the corrections of all lines and bodies go along."""
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         x, z = line_job.work.x, line_job.sea.rolling[3 * j + 1]
         for i in range(x.shape[0]):
             for c in range(SIZE):
                 x[i, c] += change * z[i, c]
-    for b in range(system.work.shape[0]):
+    for b in range(network.work.shape[0]):
         for c in range(6):
-            system.work[b, X + c] += change * job.turned[j, b, c]
+            network.work[b, X + c] += change * job.turned[j, b, c]
 
 
 @inner
-def turn_along_all(system, job, count, with_left):
+def turn_along_all(network, job, count, with_left):
     """Put the first `count` sheaves into corrections that were found without them.
 
     with_left: with their residual torques.
     """
-    carried, j = read(system.tables[0]).sea.carried, 0
+    carried, j = read(network.tables[0]).sea.carried, 0
     for k in range(carried.shape[0]):
         if carried[k, INERTIA] > 0.0:
             if j < count:
-                left = along_all(system, j)
+                left = along_all(network, j)
                 if with_left:
                     left += carried[k, LEFT_OVER]
-                turn_one(system, job, j, -left / carried[k, YIELDING])
+                turn_one(network, job, j, -left / carried[k, YIELDING])
             j += 1
 
 
 @inner
-def moments_of_all(system, k, j, cv):
+def moments_of_all(network, k, j, cv):
     """M of sheave k, number j, and its derivative by phi, of all lines, whose Sea.rolling get - p and q."""
     moment = slope = 0.0
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         n, b, q = line_job.line.h.shape[0], line_job.sea.rolling[3 * j], line_job.sea.rolling[3 * j + 2]
         old, new, u = line_job.old, line_job.new, line_job.work.u
         more, steeper = moments(line_job.line, line_job.sea, old.r, u, new, k, b, q, cv)
@@ -133,59 +133,59 @@ def moments_of_all(system, k, j, cv):
 
 
 @called
-def find_answer(system, job, k, j, cv, ca):
+def find_answer(network, job, k, j, cv, ca):
     """How all answer to sheave k, number j, with those before it; False: not finite."""
-    first = read(system.tables[0])
+    first = read(network.tables[0])
     row, state = first.sea.carried[k], first.new.sheave[k]
-    moment, slope = moments_of_all(system, k, j, cv)
-    push_along(system, j)
-    if not answer_right_sides(system, job.rank):
+    moment, slope = moments_of_all(network, k, j, cv)
+    push_along(network, j)
+    if not answer_right_sides(network, job.rank):
         return False
-    turn_along_all(system, job, j, False)
+    turn_along_all(network, job, j, False)
     alone = slope - row[INERTIA] * ca - row[BEARING] * cv
     row[LEFT_OVER] = moment - row[INERTIA] * state[TRUE] - row[BEARING] * state[SPIN]
-    row[ALONE], row[YIELDING] = alone, along_all(system, j) + alone
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    row[ALONE], row[YIELDING] = alone, along_all(network, j) + alone
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         x, z = line_job.work.x, line_job.sea.rolling[3 * j + 1]
         for i in range(x.shape[0]):
             for c in range(SIZE):
                 z[i, c] = x[i, c]
-    for b in range(system.work.shape[0]):
+    for b in range(network.work.shape[0]):
         for c in range(6):
-            job.turned[j, b, c] = system.work[b, X + c]
+            job.turned[j, b, c] = network.work[b, X + c]
     return True
 
 
 @inner
-def turn_all(system, job, cv, ca):
+def turn_all(network, job, cv, ca):
     """Put sheaves into the corrections of the iteration; False: not finite."""
-    moved, j = read(system.tables[0]).line.moved, 0
-    keep_corrections(system, job.kept, job.moved)
+    moved, j = read(network.tables[0]).line.moved, 0
+    keep_corrections(network, job.kept, job.moved)
     for k in range(moved.shape[0]):
         if moved[k] == FREE:
-            if not find_answer(system, job, k, j, cv, ca):
+            if not find_answer(network, job, k, j, cv, ca):
                 return False
             j += 1
-    put_corrections(system, job.kept, job.moved)
-    turn_along_all(system, job, j, True)
+    put_corrections(network, job.kept, job.moved)
+    turn_along_all(network, job, j, True)
     return True
 
 
 @inner
-def roll_all(system):
+def roll_all(network):
     """Sheaves turn by a part of what belongs to the corrections as they are, in the states of all lines."""
-    first, asked, j = read(system.tables[0]), system.asked, 0
+    first, asked, j = read(network.tables[0]), network.asked, 0
     for k in range(first.line.moved.shape[0]):
         if first.line.moved[k] == FREE:
             row = first.sea.carried[k]
-            change = -asked.part * (row[LEFT_OVER] + along_all(system, j)) / row[ALONE]
+            change = -asked.part * (row[LEFT_OVER] + along_all(network, j)) / row[ALONE]
             j += 1
-            for l in range(system.tables.shape[0]):
-                line_job = read(system.tables[l])
+            for l in range(network.tables.shape[0]):
+                line_job = read(network.tables[l])
                 roll_sheave(line_job.sea, line_job.new, k, change, asked.scheme_cv, asked.scheme_ca)
-    for l in range(system.tables.shape[0]):
-        sea = read(system.tables[l]).sea
+    for l in range(network.tables.shape[0]):
+        sea = read(network.tables[l]).sea
         carry_obstacles(sea.now[0] - asked.dt, sea.now[0], sea)
 
 
@@ -193,23 +193,23 @@ def roll_all(system):
 def spin_sheaves(table):
     """Answer for sheaves that turn freely (kernels.junctions.borders): they turn in steps alone."""
     job = read_spinning(table)
-    system = read_system(job.system)
-    question, asked = system.phase[0], system.asked
+    network = read_network(job.network)
+    question, asked = network.phase[0], network.asked
     if asked.what != STEP:
         return 1.0
     if question == COUPLE:
-        return 1.0 if turn_all(system, job, asked.scheme_cv, asked.scheme_ca) else 0.0
+        return 1.0 if turn_all(network, job, asked.scheme_cv, asked.scheme_ca) else 0.0
     if question == AGAIN:
-        turn_along_all(system, job, job.turned.shape[0], False)
+        turn_along_all(network, job, job.turned.shape[0], False)
     elif question == UPDATE:
-        roll_all(system)
+        roll_all(network)
     return 1.0
 
 
 class WindingJob(NamedTuple):
     """Arguments of the entry; T nodes of all lines, W winches."""
 
-    system: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
+    network: NDArray[np.int64]  # as of kernels.junctions.borders.BorderJob
     kept: Rows  # (T, 5) corrections of lines without winches
     moved: Rows  # (B, 6) and of bodies
     lengthened: Blocks  # (W, T, 5) z of lines
@@ -228,14 +228,14 @@ def waits(line_job):
 
 
 @inner
-def draw_along(system, job, count, with_left):
+def draw_along(network, job, count, with_left):
     """Put the first `count` winches into corrections that were found without them.
 
     with_left: with their residual torques.
     """
     w = 0
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         if not waits(line_job):
             continue
         if w < count:
@@ -243,50 +243,50 @@ def draw_along(system, job, count, with_left):
             left = -line_job.work.x[int(stage.pulls_at), 0]
             if with_left:
                 left += stage.out_of_balance
-            add_corrections(system, -left / stage.yielding, job.lengthened[w], job.drawn[w])
+            add_corrections(network, -left / stage.yielding, job.lengthened[w], job.drawn[w])
         w += 1
 
 
 @called
-def find_lengthening(system, job, l, w):
+def find_lengthening(network, job, l, w):
     """How all answer to 1 m more of line l, by winch number w, with those before it; False: not finite."""
-    for k in range(system.tables.shape[0]):
-        clear_right_side(system, k)
-    line_job = read(system.tables[l])
+    for k in range(network.tables.shape[0]):
+        clear_right_side(network, k)
+    line_job = read(network.tables[l])
     x, n, stage = line_job.work.x, line_job.line.h.shape[0], read_reel(line_job.reel_table).reel.stage
     i = int(stage.grows_at)
-    system.marks[system.begins[l] + i] = 1
+    network.marks[network.begins[l] + i] = 1
     x[i, 0] = line_job.work.X[(n + 1) * ROW + i * KEPT + 62] * stage.puts
-    eliminate_right_side(system, l)
-    if not answer_right_sides(system, job.rank):
+    eliminate_right_side(network, l)
+    if not answer_right_sides(network, job.rank):
         return False
-    draw_along(system, job, w, False)
+    draw_along(network, job, w, False)
     stage.yielding = stage.alone - x[int(stage.pulls_at), 0]
-    keep_corrections(system, job.lengthened[w], job.drawn[w])
+    keep_corrections(network, job.lengthened[w], job.drawn[w])
     return True
 
 
 @inner
-def find_lengthenings(system, job):
+def find_lengthenings(network, job):
     """How all answer to the lengths of all winches; False: not finite."""
     w = 0
-    for l in range(system.tables.shape[0]):
-        if waits(read(system.tables[l])):
-            if not find_lengthening(system, job, l, w):
+    for l in range(network.tables.shape[0]):
+        if waits(read(network.tables[l])):
+            if not find_lengthening(network, job, l, w):
                 return False
             w += 1
     return True
 
 
 @inner
-def give_lengths(system):
+def give_lengths(network):
     """Winches give a part of what belongs to the corrections as they are."""
-    for l in range(system.tables.shape[0]):
-        line_job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        line_job = read(network.tables[l])
         if waits(line_job):
             stage = read_reel(line_job.reel_table).reel.stage
             left = stage.out_of_balance - line_job.work.x[int(stage.pulls_at), 0]
-            stage.change, stage.lengthens = -system.asked.part * left / stage.alone, MOVES
+            stage.change, stage.lengthens = -network.asked.part * left / stage.alone, MOVES
             wind(line_job)
 
 
@@ -294,18 +294,18 @@ def give_lengths(system):
 def wind_lines(table):
     """Answer for winches of joined lines (kernels.junctions.borders): they move in steps alone."""
     job = read_winding(table)
-    system = read_system(job.system)
-    question, count = system.phase[0], job.lengthened.shape[0]
-    if system.asked.what != STEP:
+    network = read_network(job.network)
+    question, count = network.phase[0], job.lengthened.shape[0]
+    if network.asked.what != STEP:
         return 1.0
     if question == COUPLE:
-        keep_corrections(system, job.kept, job.moved)
-        if not find_lengthenings(system, job):
+        keep_corrections(network, job.kept, job.moved)
+        if not find_lengthenings(network, job):
             return 0.0
-        put_corrections(system, job.kept, job.moved)
-        draw_along(system, job, count, True)
+        put_corrections(network, job.kept, job.moved)
+        draw_along(network, job, count, True)
     elif question == AGAIN:
-        draw_along(system, job, count, False)
+        draw_along(network, job, count, False)
     elif question == UPDATE:
-        give_lengths(system)
+        give_lengths(network)
     return 1.0

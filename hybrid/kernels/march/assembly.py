@@ -69,7 +69,7 @@ from hybrid.kernels.state.report import (
 )
 
 UNIT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-# What Ends.held says of an end that a point of a system of lines holds (kernels.run.network): its place is an unknown.
+# What Ends.held says of an end that a point of a network of lines holds (kernels.run.network): its place is an unknown.
 JOINED = 2
 # Part of the torsional stiffness that keeps a rod pinned at both ends from spinning freely.
 LEAST_SPIN_STIFFNESS = 1e-9

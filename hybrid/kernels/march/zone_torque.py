@@ -12,7 +12,7 @@ before it, carried along the chords by the smallest rotations, and counted beyon
 It answers to the spins of the cells beside it and to all chords:
     d turn = dpsi_after - dpsi_before + sum c_i.(de_{i-1}/l_{i-1} + de_i/l_i).
 That couples two cells far apart, which the march does not know: its solution is corrected by that of a small dense
-system.  Newton calls `pass_torque` by its address, so that lines without such zones compile none of it.
+network.  Newton calls `pass_torque` by its address, so that lines without such zones compile none of it.
 
 Where zones change, rods get new directors and zones new turns.  Along the old line the twist is known everywhere: how
 far its directors turn against one that is carried along the chords by the smallest rotations, and in zones the share of

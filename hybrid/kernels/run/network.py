@@ -58,7 +58,7 @@ from hybrid.kernels.junctions.borders import (
     ask,
 )
 from hybrid.kernels.junctions.junctions import move_joints
-from hybrid.kernels.junctions.network_job import read_system, task_of
+from hybrid.kernels.junctions.network_job import read_network, task_of
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import put_matrix as put_matrix_of
@@ -133,29 +133,29 @@ TASK_DT = Task._fields.index("dt")
 
 
 @inner
-def march_lines(system, steps):
+def march_lines(network, steps):
     """March all lines, and find what they and borders do to points and bodies.
 
     steps: whether this is an iteration of a step, of which lines that are paid out know (kernels.reel.payout.iterate).
     Returns -1 or a line that failed, and its bad node.
     """
-    tables, joints = system.tables, system.joints
-    ask(system, BEFORE_MARCH)
+    tables, joints = network.tables, network.joints
+    ask(network, BEFORE_MARCH)
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
         if steps:
             wind(job)
-        outcome, _, _, where = call_solver(system.solver, tables[l])
+        outcome, _, _, where = call_solver(network.solver, tables[l])
         # the last block is not solved yet; forces of a line alone are known whatever its equations are
         known = joints[l, END] >= 0 and where == n
-        if system.asked.what == ASSEMBLY and joints[l, START] < 0 and joints[l, END] < 0:
+        if network.asked.what == ASSEMBLY and joints[l, START] < 0 and joints[l, END] < 0:
             known = job.work.report[RESIDUAL] < math.inf
         if outcome != OK and not (outcome == SINGULAR and known):
             return l, where
         if steps:
             wind(job)
-    ask(system, FORCE)
+    ask(network, FORCE)
     return -1, -1
 
 
@@ -325,13 +325,13 @@ def error_ratio(tables, allowed):
 
 
 @inner
-def end_system_step(system, task, s, solved):
+def end_network_step(network, task, s, solved):
     """Rates and reports of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
 
-    Whoever keeps it books it (book_system_step).
+    Whoever keeps it books it (book_network_step).
     """
-    line, turn, cell = end_lines(system.tables, system.joints, system.floors, s, task, solved)
-    turned = end_bodies(system.old, system.new, system.work, s)
+    line, turn, cell = end_lines(network.tables, network.joints, network.floors, s, task, solved)
+    turned = end_bodies(network.old, network.new, network.work, s)
     if line >= 0:
         return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
     if solved and not turned < LARGEST_STEP_TURN:
@@ -340,35 +340,35 @@ def end_system_step(system, task, s, solved):
 
 
 @kernel(inlined=False)
-def book_system_step(table):
+def book_network_step(table):
     """Books of the step that was solved last, and is kept."""
-    system = read_system(table)
-    dt, t = system.asked.dt, system.asked.time
-    keep_books(system.tables, system.joints, dt, t)
-    book_bodies(system.work, dt)
+    network = read_network(table)
+    dt, t = network.asked.dt, network.asked.time
+    keep_books(network.tables, network.joints, dt, t)
+    book_bodies(network.work, dt)
 
 
 @inner
-def predict_step(system, task, t):
+def predict_step(network, task, t):
     """Predict a step to t (s) of all lines and bodies.
 
     Its task and scheme, whether something turns too far, and by how much (rad), its line (-1: a body) and cell.
     """
-    safe, rho = ask(system, PREDICT), min(task.rho, ask(system, SPECTRAL_RADIUS))
+    safe, rho = ask(network, PREDICT), min(task.rho, ask(network, SPECTRAL_RADIUS))
     task = with_radius(task, rho)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)
-    turn, _ = predict_bodies(system.old, system.new, system.work, s)
+    turn, _ = predict_bodies(network.old, network.new, network.work, s)
     if not turn < LARGEST_STEP_TURN:
         return task, s, True, turn, -1, -1
-    line, turn, cell = begin_lines(system.tables, s, safe)
+    line, turn, cell = begin_lines(network.tables, s, safe)
     return task, s, line >= 0, turn, line, cell
 
 
 @inner
-def give_scheme(system, task, s):
+def give_scheme(network, task, s):
     """Tell all lines and borders of the scheme with which they are marched; whether anything rubs."""
-    rub, tables, numbers = False, system.tables, system.numbers
-    system.asked.scheme_cv, system.asked.scheme_ca = s.cv, s.ca
+    rub, tables, numbers = False, network.tables, network.numbers
+    network.asked.scheme_cv, network.asked.scheme_ca = s.cv, s.ca
     for l in range(tables.shape[0]):
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
         rub = rubs(read(tables[l])) or rub
@@ -390,28 +390,28 @@ def first_not_finite(tables):
 
 
 @inner
-def find_corrections(system, task, s, it):
+def find_corrections(network, task, s, it):
     """Corrections of iteration `it` of all lines and borders, in space.
 
     Returns OPEN, or the outcome with which the solution ends here, with line and cell or node where it fails.
     """
-    tables = system.tables
-    line, where = march_lines(system, task.what == STEP)
+    tables = network.tables
+    line, where = march_lines(network, task.what == STEP)
     if line >= 0:
         report = read(tables[line]).work.report
         if not report[RESIDUAL] < math.inf:
             return NOT_FINITE, line, int(report[RESIDUAL_NODE])
         return SINGULAR, line, where
-    ask(system, BALANCE)
+    ask(network, BALANCE)
     if task.what == ASSEMBLY:
         carry_lines(tables, s, task.what)  # rates of twist are known now
         return OK, -1, -1
-    ask(system, BLOCK)
+    ask(network, BLOCK)
     if task.what == JUNCTIONS:
         return OK, -1, -1
     if task.what == EQUILIBRIUM and it == 1:
-        ask(system, HOLD)
-    answer = ask(system, COUPLE)
+        ask(network, HOLD)
+    answer = ask(network, COUPLE)
     if answer == NO_NUMBERS:
         line, where = first_not_finite(tables)
         return NOT_FINITE, line, where
@@ -421,12 +421,12 @@ def find_corrections(system, task, s, it):
 
 
 @inner
-def find_part(system, task, s, it, rub):
+def find_part(network, task, s, it, rub):
     """The part of the corrections that is made, and their size as Newton compares it, its line and cell."""
-    shift, turn, size, line, where = size_up(system.tables, s.ca)
-    moves = system.moves
+    shift, turn, size, line, where = size_up(network.tables, s.ca)
+    moves = network.moves
     moves[FAR], moves[TURNED] = 0.0, 0.0
-    ask(system, MEASURE)
+    ask(network, MEASURE)
     far, turned = moves[FAR] / task.limits.reach, moves[TURNED]
     shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
     part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
@@ -434,39 +434,39 @@ def find_part(system, task, s, it, rub):
         part = LARGEST_TURN / turn
     if rub and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
         part *= 0.5
-    return min(part, ask(system, SAFE_PART)), size, line, where
+    return min(part, ask(network, SAFE_PART)), size, line, where
 
 
 @inner
-def make_corrections(system, s, part):
+def make_corrections(network, s, part):
     """Lines and borders move by a part of their corrections."""
-    system.asked.part = part
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    network.asked.part = part
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
-    ask(system, UPDATE)
+    ask(network, UPDATE)
 
 
 @inner
-def iterate(system, task, s):
+def iterate(network, task, s):
     """Newton's iterations: outcome, their number, predicted next correction, line and cell, whether it was cut short."""
-    most, rub = task.limits.most, give_scheme(system, task, s)
+    most, rub = task.limits.most, give_scheme(network, task, s)
     before, left, size = math.inf, math.inf, math.inf
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
-    ask(system, FORGET)
+    ask(network, FORGET)
     while it < most and outcome == NOT_CONVERGED:
         it += 1
-        found, line, where = find_corrections(system, task, s, it)
+        found, line, where = find_corrections(network, task, s, it)
         if found != OPEN:
             outcome, before = found, math.inf
             break
-        part, size, line, where = find_part(system, task, s, it, rub)
-        make_corrections(system, s, part)
+        part, size, line, where = find_part(network, task, s, it, rub)
+        make_corrections(network, s, part)
         outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
         before = size if part == 1.0 else math.inf
         if task.what == EQUILIBRIUM:
-            outcome = NOT_CONVERGED if system.moves[STRENGTH] > 1.0 else outcome
-            ask(system, RELAX)
+            outcome = NOT_CONVERGED if network.moves[STRENGTH] > 1.0 else outcome
+            ask(network, RELAX)
     cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
     if cut_short:
         outcome = OK
@@ -476,34 +476,34 @@ def iterate(system, task, s):
 
 
 @kernel(inlined=False)
-def solve_system(table):
-    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system (NetworkJob).
+def solve_network(table):
+    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a network (NetworkJob).
 
     JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
-    system = read_system(table)
-    tables, task = system.tables, task_of(system.asked)
+    network = read_network(table)
+    tables, task = network.tables, task_of(network.asked)
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
-        task, s, fails, turn, line, cell = predict_step(system, task, system.asked.time)
+        task, s, fails, turn, line, cell = predict_step(network, task, network.asked.time)
         if fails:
             return TURNED_TOO_FAR, 0, turn, line, cell
     else:
-        start_here(system.old, system.work)
-    outcome, it, left, line, where, cut_short = iterate(system, task, s)
+        start_here(network.old, network.work)
+    outcome, it, left, line, where, cut_short = iterate(network, task, s)
     if task.what == STEP or task.what == EQUILIBRIUM:
-        ask(system, CARRY)
+        ask(network, CARRY)
         carry_lines(tables, s, task.what)
     if task.what == STEP:
-        bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)
+        bad, line_of_bad, cell = end_network_step(network, task, s, outcome == OK)
         if bad != OK:
             outcome, line, where = bad, line_of_bad, cell
         elif cut_short:
             outcome = CUT_SHORT
     if task.what == ASSEMBLY and outcome == OK:
-        begin_books(tables, system.joints, system.asked.time)
-        book_bodies(system.work, 0.0)
+        begin_books(tables, network.joints, network.asked.time)
+        book_bodies(network.work, 0.0)
     return outcome, it, left, line, where
 
 
@@ -554,26 +554,26 @@ def sample_body(before, now, worked, b, where, row):
 
 
 @inner
-def carry_sampled(system, sea, rows):
+def carry_sampled(network, sea, rows):
     """Obstacles that bodies carry are where these are in samples, rows of them."""
-    for k in range(system.rides.shape[0]):
-        b = system.rides[k]
+    for k in range(network.rides.shape[0]):
+        b = network.rides[k]
         if b >= 0:
             put_vector(sea.carried, k, ENDED, vector(rows[b], SAMPLE_PLACE))
             put_matrix_of(sea.carried, k, TURNED_AXES, matrix(rows[b], SAMPLE_AXES))
 
 
 @inner
-def record_sample(steps, system, where):
-    """Lines and bodies at a time, as the next rows of the buffers; `system` leads on from the state of now."""
+def record_sample(steps, network, where):
+    """Lines and bodies at a time, as the next rows of the buffers; `network` leads on from the state of now."""
     t, x, dt, k = where
     count = steps.counts.samples
-    for b in range(system.work.shape[0]):
-        sample_body(system.new, system.old, steps.worked, b, where, steps.bodies[count, b])
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    for b in range(network.work.shape[0]):
+        sample_body(network.new, network.old, steps.worked, b, where, steps.bodies[count, b])
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         now, before, books = job.old, job.new, job.books
-        carry_sampled(system, job.sea, steps.bodies[count])
+        carry_sampled(network, job.sea, steps.bodies[count])
         row, n = books.samples[count], job.line.h.shape[0]
         if x < 1.0:
             sea_at(t, job.sea)
@@ -589,11 +589,11 @@ def record_sample(steps, system, where):
 
 
 @inner
-def rows_of_samples(steps, system):
+def rows_of_samples(steps, network):
     """How many samples fit into the buffers."""
     rows = steps.bodies.shape[0]
-    for l in range(system.tables.shape[0]):
-        rows = min(rows, read(system.tables[l]).books.samples.shape[0])
+    for l in range(network.tables.shape[0]):
+        rows = min(rows, read(network.tables[l]).books.samples.shape[0])
     return rows
 
 
@@ -605,23 +605,23 @@ def is_due(steps, sign):
 
 
 @inner
-def sample_within(steps, system):
+def sample_within(steps, network):
     """Sample the outputs that fall into the last step, but not on its end; 0: the buffers are full before the last."""
-    clock, rows = steps.clock, rows_of_samples(steps, system)
+    clock, rows = steps.clock, rows_of_samples(steps, network)
     while is_due(steps, -1):
         if steps.counts.samples == rows:
             return 0
         t, dt = steps.outputs[steps.counts.output], clock.last_dt
-        record_sample(steps, system, (t, (t - clock.previous) / dt, dt, clock.earlier_dt / dt))
+        record_sample(steps, network, (t, (t - clock.previous) / dt, dt, clock.earlier_dt / dt))
     return 1
 
 
 @inner
-def sample_now(steps, system):
+def sample_now(steps, network):
     """Sample the outputs that are due at the state of now, as it is; 0: the buffers are full before the last."""
-    rows = rows_of_samples(steps, system)
+    rows = rows_of_samples(steps, network)
     while is_due(steps, 1):
         if steps.counts.samples == rows:
             return 0
-        record_sample(steps, system, (steps.outputs[steps.counts.output], 1.0, 0.0, 0.0))
+        record_sample(steps, network, (steps.outputs[steps.counts.output], 1.0, 0.0, 0.0))
     return 1

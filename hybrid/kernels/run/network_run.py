@@ -1,7 +1,7 @@
 """Steps of several lines that meet at points, many in a call: the compiled loop around kernels.run.network.
 
 Phases, lengths of steps, halvings and codes are those of one cable (kernels.state.books, kernels.step.step_control), with a clock
-and counts that all lines have in common.  The states of lines and bodies take turns: SystemJobs of both parities are
+and counts that all lines have in common.  The states of lines and bodies take turns: NetworkJobs of both parities are
 bound once.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK, read_members
-from hybrid.kernels.junctions.network_job import is_grouped_otherwise, is_touched_alone, read_system
+from hybrid.kernels.junctions.network_job import is_grouped_otherwise, is_touched_alone, read_network
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
@@ -73,7 +73,7 @@ from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, note
 LINE, CUT_LINE, TURNED_LINE, SLACK_LINE = range(4)
 # What a call returns beside codes of kernels.state.books: lines are to be solved with others, or by themselves, from now on.
 REGROUP = 16
-# What `run_system` returns beside codes of kernels.state.books: zones, or nodes at a winch, are due, of lines where what
+# What `run_network` returns beside codes of kernels.state.books: zones, or nodes at a winch, are due, of lines where what
 # changes then needs no Python.
 CELLS_DUE = 32
 # Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
@@ -118,15 +118,15 @@ class StepsJob(NamedTuple):
     reeled: NDArray[np.int64]  # (W, ..) tables of kernels.mesh.remesh.RemeshJob, of lines where that needs no Python
     reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
-    solver: int = 0  # address of kernels.run.network.solve_system
+    solver: int = 0  # address of kernels.run.network.solve_network
     leader: int = 0  # of kernels.junctions.network_job.lead_lone; 0: no line can come near what is free
     finder: int = 0  # and of find_near
-    book: int = 0  # of book_system_step
-    sampler: int = 0  # of sample_system
+    book: int = 0  # of book_network_step
+    sampler: int = 0  # of sample_network
     stirrer: int = 0  # of kernels.junctions.bodies.update_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.advance_zones; 0: no zones move, or Python follows them
-    runner: int = 0  # of run_system, and of kernels.mesh.remesh.ask_cells and change_cells; 0: Python changes cells
+    runner: int = 0  # of run_network, and of kernels.mesh.remesh.ask_cells and change_cells; 0: Python changes cells
     asker: int = 0
     changer: int = 0
     payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
@@ -158,12 +158,12 @@ call_sample, call_stir, call_watch = caller(0), caller(0), caller(0)
 
 
 @inner
-def end_of_tries(steps, system):
+def end_of_tries(steps, network):
     """Time at which the present try ends: of the line whose end would turn too far in the least of it."""
     clock, end = steps.clock, math.inf
-    for l in range(system.tables.shape[0]):
+    for l in range(network.tables.shape[0]):
         angle, step = clock.cut_angle, clock.cut_step
-        own = end_of_try(clock, read(system.tables[l]).moves)
+        own = end_of_try(clock, read(network.tables[l]).moves)
         if own < end:
             steps.lines[TURNED_LINE], end = l, own
         else:
@@ -172,10 +172,10 @@ def end_of_tries(steps, system):
 
 
 @inner
-def move_lines(system, t):
+def move_lines(network, t):
     """Ends and sea of all lines at t (s)."""
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         ends_at(t, job.moves, job.sea, job.ends, job.books.velocity)
         sea_at(t, job.sea)
 
@@ -198,11 +198,11 @@ def load_bodies(bodies, loads, history, t):
 
 
 @inner
-def renew_water(steps, system):
+def renew_water(steps, network):
     """The water around members of bodies at the end of the try, where they go on from the state of now."""
     clock = steps.clock
     for m in range(steps.members.shape[0] if steps.stirrer != 0 else 0):
-        job, row = read_members(steps.members[m]), system.old[steps.with_members[m]]
+        job, row = read_members(steps.members[m]), network.old[steps.with_members[m]]
         for k in range(STATE):
             job.state[k] = row[k]
         job.dt[0], job.waves[0] = clock.try_end - clock.now, 1.0
@@ -211,7 +211,7 @@ def renew_water(steps, system):
 
 
 @inner
-def try_lone(steps, system):
+def try_lone(steps, network):
     """Solve the step that is tried of every line that is joined to nothing that moves with it.
 
     Returns outcome, line, iterations, predicted next correction, and node, of the first that fails, else the largest.
@@ -228,7 +228,7 @@ def try_lone(steps, system):
             outcome, steps.counts.is_cut = OK, 1
         if outcome == OK and may_gain(job, clock.try_end - clock.now) and ask_contact(job, GAIN) > 0.0:
             outcome = TURNED_TOO_FAR  # in halves
-        if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
+        if outcome == OK and not job.work.report[SLACKEST] > network.floors[l]:
             outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
         if outcome != OK:
             return outcome, l, it, left, where
@@ -237,9 +237,9 @@ def try_lone(steps, system):
 
 
 @inner
-def try_step(steps, system):
+def try_step(steps, network):
     """Solve the step that is tried, and note how that ended."""
-    clock, counts, asked = steps.clock, steps.counts, system.asked
+    clock, counts, asked = steps.clock, steps.counts, network.asked
     table, own = steps.joined_even, steps.even
     if counts.parity:
         table, own = steps.joined_odd, steps.odd
@@ -251,12 +251,12 @@ def try_step(steps, system):
     asked.cut = 1.0 if counts.most_iterations > 0 else 0.0
     if counts.most_iterations > 0:
         asked.most = min(asked.most, float(counts.most_iterations - counts.taken))
-    for l in range(system.tables.shape[0]):
-        books = read(system.tables[l]).books
+    for l in range(network.tables.shape[0]):
+        books = read(network.tables[l]).books
         books.counts.parity, books.clock.shortest = counts.parity, clock.shortest
         books.counts.controlled = counts.controlled
     outcome, line, it, left, where = OK, -1, 0, 0.0, -1
-    if steps.joined.shape[0] > 0 or system.work.shape[0] > 0:
+    if steps.joined.shape[0] > 0 or network.work.shape[0] > 0:
         result, it, left, row, where = call_step(steps.solver, table)
         if result == CUT_SHORT:
             result, counts.is_cut = OK, 1
@@ -266,7 +266,7 @@ def try_step(steps, system):
     if outcome == OK:
         if steps.leader != 0:
             call_book(steps.leader, own)
-        result, failed, more, worse, place = try_lone(steps, system)
+        result, failed, more, worse, place = try_lone(steps, network)
         outcome, it, left = result, max(it, more), max(left, worse)
         if failed >= 0:
             line, where = failed, place
@@ -276,7 +276,7 @@ def try_step(steps, system):
 
 
 @inner
-def touches_free(steps, system):
+def touches_free(steps, network):
     """Whether a line that was solved by itself has come to touch what is free, at the end of the try."""
     if steps.finder == 0 or steps.counts.outcome != OK:
         return False
@@ -284,7 +284,7 @@ def touches_free(steps, system):
     if steps.counts.parity:
         next_table = steps.even
     call_book(steps.finder, next_table)
-    return is_touched_alone(system)
+    return is_touched_alone(network)
 
 
 @inner
@@ -338,12 +338,12 @@ def give_up(steps):
 
 
 @inner
-def judge(steps, system):
+def judge(steps, network):
     """Whether the try is the step (1), is to be repeated in another length (0), or has failed for good (-1)."""
     clock, counts = steps.clock, steps.counts
     dt, outcome = clock.try_end - clock.now, counts.outcome
     if outcome == OK:
-        if counts.controlled and not passes(clock, counts, dt, error_ratio(system.tables, system.allowed)):
+        if counts.controlled and not passes(clock, counts, dt, error_ratio(network.tables, network.allowed)):
             counts.cut_by_error += 1
             give_up(steps)
             return 0
@@ -352,7 +352,7 @@ def judge(steps, system):
         return -1
     if outcome == SLACK:
         # As of one line: the waves are those of the line that is slack, whatever moves its ends.
-        if dt <= read(system.tables[steps.lines[LINE]]).books.clock.wave_step:
+        if dt <= read(network.tables[steps.lines[LINE]]).books.clock.wave_step:
             return -1
         clock.slack_step, counts.slack_cell, steps.lines[SLACK_LINE] = dt, counts.where, steps.lines[LINE]
     halve(clock, counts, dt)
@@ -365,11 +365,11 @@ def judge(steps, system):
 
 
 @inner
-def largest_residual(system, arm):
+def largest_residual(network, arm):
     """Largest force (N) that is left over at a node, a point or, moments by their arm (m), a body; without contact."""
-    most, net, work = 0.0, system.net, system.work
-    for l in range(system.tables.shape[0]):
-        most = max(most, read(system.tables[l]).work.report[RESIDUAL])
+    most, net, work = 0.0, network.net, network.work
+    for l in range(network.tables.shape[0]):
+        most = max(most, read(network.tables[l]).work.report[RESIDUAL])
     for p in range(net.shape[0]):
         for k in range(3):
             most = max(most, abs(net[p, k]))
@@ -393,13 +393,13 @@ def watch_itself(job, state):
 
 
 @inner
-def accept(steps, system):
+def accept(steps, network):
     """The step that was tried is taken: clock, log, and what there is to look at."""
     clock, counts = steps.clock, steps.counts
-    dt, residual = clock.try_end - clock.now, largest_residual(system, steps.limits[OF_ARM])
+    dt, residual = clock.try_end - clock.now, largest_residual(network, steps.limits[OF_ARM])
     clock.earlier_dt = clock.last_dt if clock.now > clock.previous else 0.0
     clock.previous, clock.now, clock.last_dt = clock.now, clock.try_end, dt
-    keep_bodies(steps.worked, system.work)
+    keep_bodies(steps.worked, network.work)
     counts.parity = 1 - counts.parity
     counts.steps += 1
     counts.iterations = counts.tries
@@ -410,8 +410,8 @@ def accept(steps, system):
         job = read(steps.lone[j])
         if job.was.shape[0] > 0:
             job.books.counts.notices |= watch_push(job.books.clock, job.work.report)
-    for l in range(system.tables.shape[0]):
-        job = read(system.tables[l])
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
         report, row = job.work.report, steps.log[counts.rows, l]
         job.books.clock.last_rho = report[USED_RHO]
         if l == first:
@@ -443,10 +443,10 @@ def renew_ended(steps):
     """After a step that was shortened: accelerations of lines that share no end with others, as of one line."""
     clock, counts = steps.clock, steps.counts
     if counts.repeats > 0:
-        system = read_system(steps.even)
-        for l in range(system.tables.shape[0]):
-            if system.joints[l, 0] < 0 and system.joints[l, 1] < 0:
-                job = read(system.tables[l])
+        network = read_network(steps.even)
+        for l in range(network.tables.shape[0]):
+            if network.joints[l, 0] < 0 and network.joints[l, 1] < 0:
+                job = read(network.tables[l])
                 state = job.old
                 if counts.parity:
                     state = job.new
@@ -493,7 +493,7 @@ def between_steps(steps, table):
         own = steps.even
         if counts.parity:
             own = steps.odd
-        clock.try_end = end_of_tries(steps, read_system(own))
+        clock.try_end = end_of_tries(steps, read_network(own))
         counts.phase = SOLVE
         if counts.asks & ASK_BEFORE:
             return TRYING
@@ -501,7 +501,7 @@ def between_steps(steps, table):
 
 
 @kernel(inlined=False)
-def sample_system(table):
+def sample_network(table):
     """Sample the outputs that are due: within the last step where that comes next, else those at the state of now.
 
     Returns 0 where the buffers are full before the last of them, else 1.
@@ -511,12 +511,12 @@ def sample_system(table):
     if steps.counts.parity:
         own = steps.odd
     if steps.counts.phase == SAMPLE:
-        return sample_within(steps, read_system(own))
-    return sample_now(steps, read_system(own))
+        return sample_within(steps, read_network(own))
+    return sample_now(steps, read_network(own))
 
 
 @kernel
-def run_system(table):
+def run_network(table):
     """Steps of all lines until a code of kernels.state.books is returned."""
     steps = read_steps(table)
     counts = steps.counts
@@ -527,37 +527,37 @@ def run_system(table):
         own = steps.even
         if counts.parity:
             own = steps.odd
-        system = read_system(own)
+        network = read_network(own)
         if counts.phase == SOLVE:
             advance_lines(steps)
             if not counts.asks & ASK_BEFORE:
-                move_lines(system, steps.clock.try_end)
-                load_bodies(system.bodies, steps.loads, steps.history, steps.clock.try_end)
-                renew_water(steps, system)
+                move_lines(network, steps.clock.try_end)
+                load_bodies(network.bodies, steps.loads, steps.history, steps.clock.try_end)
+                renew_water(steps, network)
             pay_lines(steps)
-            try_step(steps, system)
+            try_step(steps, network)
             counts.phase = JUDGE
             pay_lines(steps)
-            if touches_free(steps, system):
+            if touches_free(steps, network):
                 give_up(steps)
                 return REGROUP
             if counts.asks & ASK_TRIES:
                 return TRIED
             if steps.follower != 0 and (counts.outcome != OK or advance_lines(steps) != 0):
                 return TRIED
-        verdict = judge(steps, system)
+        verdict = judge(steps, network)
         if verdict < 0:
             return FAILED
         if verdict > 0:
             call_book(steps.book, own)
-            accept(steps, system)
-            if steps.finder != 0 and is_grouped_otherwise(system):
+            accept(steps, network)
+            if steps.finder != 0 and is_grouped_otherwise(network):
                 return REGROUP
 
 
 @kernel
 def run_lines(table):
-    """`run_system`, with other cells, and nodes that enter or leave, of lines that ask for nothing else.
+    """`run_network`, with other cells, and nodes that enter or leave, of lines that ask for nothing else.
 
     These write to tables that steps take as constant, so steps are called by their address.
     """

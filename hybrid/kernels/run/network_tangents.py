@@ -52,7 +52,7 @@ from hybrid.kernels.junctions.bodies import (
 )
 from hybrid.kernels.junctions.borders import END, answer_right_sides, hand_on
 from hybrid.kernels.junctions.borders import START as BEGIN
-from hybrid.kernels.junctions.network_job import read_system, task_of
+from hybrid.kernels.junctions.network_job import read_network, task_of
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -132,8 +132,8 @@ class NetworkTangents(NamedTuple):
 blank_bodies = blanks(OtherBodies)
 
 
-blank_system_tangents = blanks(NetworkTangents)
-read_bodies, read_tangents = reader(blank_bodies()), reader(blank_system_tangents())
+blank_network_tangents = blanks(NetworkTangents)
+read_bodies, read_tangents = reader(blank_bodies()), reader(blank_network_tangents())
 
 
 # --- bodies -----------------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def turned_by(n, x):
 
 
 @inner
-def predict_body_rates(system, other, s):
+def predict_body_rates(network, other, s):
     """Tangents of all bodies at the end of a step as they are predicted, from those before it."""
     dt, am, af, _, be, _, ca = s
     was, now = other.before, other.rates
@@ -168,16 +168,16 @@ def predict_body_rates(system, other, s):
                 y[shift + k] = more if shift == N_OF else x[k] + more
                 y[v + k] = x[v + k] + dt * x[a + k]
                 y[vd + k] = (am * x[a + k] - af * x[vd + k]) / (1.0 - af) + ca * be * dt * dt * x[a + k]
-        z = system.work[b]
+        z = network.work[b]
         turn = mat_vec(matrix(z, START), turned_by(vector(z, N), vector(y, N_OF)))
         put(y, TURN_OF, add(vector(x, TURN_OF), turn))
 
 
 @inner
-def correct_body_rates(system, now, s):
+def correct_body_rates(network, now, s):
     """Add the corrections of bodies to tangents."""
     for b in range(now.shape[0]):
-        y, z = now[b], system.work[b]
+        y, z = now[b], network.work[b]
         n = vector(z, N)
         g, _ = jacobian_functions(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
         dn = mat_vec(inverse_left_jacobian(n, g), vec_mat(vector(z, X + 3), matrix(z, START)))
@@ -206,42 +206,42 @@ def find_body_rates(other, s):
 
 
 @inner
-def put_bodies(system, other):
+def put_bodies(network, other):
     """Where the other bodies stand: those of the run and h times the tangents."""
     h = other.h
     for b in range(other.rates.shape[0]):
         x, y, here, there, z, own = (
-            other.before[b], other.rates[b], system.new[b], other.new[b], system.work[b], other.work[b],
+            other.before[b], other.rates[b], network.new[b], other.new[b], network.work[b], other.work[b],
         )  # fmt: skip
         for k in range(3):
             there[PLACE + k] = here[PLACE + k] + h * y[k]
             for o, rate in ((V, V_OF), (A, A_OF), (VD, VD_OF), (W, W_OF), (WA, WA_OF), (WD, WD_OF)):
                 there[o + k] = here[o + k] + h * y[rate + k]
-            other.old[b, PLACE + k] = system.old[b, PLACE + k] + h * x[k]
+            other.old[b, PLACE + k] = network.old[b, PLACE + k] + h * x[k]
             own[U + k] = z[U + k] + h * (y[k] - x[k])
         put_matrix(there, FRAME, mat_mat(rotation(scale(h, vector(y, TURN_OF))), matrix(here, FRAME)))
 
 
 @inner
-def reach(system, j, k, b):
+def reach(network, j, k, b):
     """Where fairlead k of joined line j is from the origin of its body in the run, in space."""
-    return mat_vec(matrix(system.new[b], FRAME), vector(system.fairleads[j, k], 0))
+    return mat_vec(matrix(network.new[b], FRAME), vector(network.fairleads[j, k], 0))
 
 
 @inner
-def place_fairleads(system, net, p, s):
+def place_fairleads(network, net, p, s):
     """Ends of the other lines at bodies are where their fairleads are."""
-    other, points = read_bodies(net.bodies[p]), system.net.shape[0]
-    for j in range(system.joints.shape[0]):
+    other, points = read_bodies(net.bodies[p]), network.net.shape[0]
+    for j in range(network.joints.shape[0]):
         job = read_job(net.lines[net.joined[j]])
         now = read_other(job.tables[p]).rates
         for k in range(2):
-            b = system.joints[j, k] - points
+            b = network.joints[j, k] - points
             if b >= 0:
                 i, y = k * job.line.h.shape[0], other.rates[b]
-                rho = reach(system, j, k, b)
-                apart = scale(1.0 / other.h, sub(vector(other.fairleads[j, k], 0), vector(system.fairleads[j, k], 0)))
-                more = add(cross(vector(y, TURN_OF), rho), mat_vec(matrix(system.new[b], FRAME), apart))
+                rho = reach(network, j, k, b)
+                apart = scale(1.0 / other.h, sub(vector(other.fairleads[j, k], 0), vector(network.fairleads[j, k], 0)))
+                more = add(cross(vector(y, TURN_OF), rho), mat_vec(matrix(network.new[b], FRAME), apart))
                 for m in range(3):
                     shift = y[m] + more[m] - now.r[i, m]
                     now.r[i, m] += shift
@@ -250,22 +250,22 @@ def place_fairleads(system, net, p, s):
 
 
 @inner
-def own_right_sides(system, net, p):
+def own_right_sides(network, net, p):
     """What bodies themselves leave over beside those of the run, and by what the arms of their lines are others."""
-    other, points = read_bodies(net.bodies[p]), system.net.shape[0]
+    other, points = read_bodies(net.bodies[p]), network.net.shape[0]
     for b in range(other.rates.shape[0]):
-        own_force(system.bodies[b], system.old[b], system.new[b], system.work[b])
+        own_force(network.bodies[b], network.old[b], network.new[b], network.work[b])
         own_force(other.numbers[b], other.old[b], other.new[b], other.work[b])
         for k in range(6):
-            other.right[b, k] = (system.work[b, OWN + k] - other.work[b, OWN + k]) / other.h
-    for j in range(system.joints.shape[0]):
+            other.right[b, k] = (network.work[b, OWN + k] - other.work[b, OWN + k]) / other.h
+    for j in range(network.joints.shape[0]):
         job = read_job(net.lines[net.joined[j]])
         report = read_other(job.tables[p]).work.report
         for k in range(2):
-            b = system.joints[j, k] - points
+            b = network.joints[j, k] - points
             if b >= 0:
                 there = mat_vec(matrix(other.new[b], FRAME), vector(other.fairleads[j, k], 0))
-                arm = scale(1.0 / other.h, sub(there, reach(system, j, k, b)))
+                arm = scale(1.0 / other.h, sub(there, reach(network, j, k, b)))
                 moment = cross(arm, vector(report, NET_A + 3 * k))
                 for m in range(3):
                     other.right[b, 3 + m] -= moment[m]
@@ -307,34 +307,34 @@ def set_right_side(line_work, job, other, starts, ends):
 
 
 @inner
-def put_right_sides(system, right, part):
+def put_right_sides(network, right, part):
     """A part of right-hand sides (B, 6) of bodies to where borders find them."""
-    first = 3 * system.net.shape[0]
+    first = 3 * network.net.shape[0]
     for b in range(right.shape[0]):
         for k in range(6):
-            system.right[first + 6 * b + k] = part * right[b, k]
+            network.right[first + 6 * b + k] = part * right[b, k]
 
 
 @inner
-def answer_joined(system, net, p):
+def answer_joined(network, net, p):
     """Corrections of the other lines that move with points and bodies, and of these."""
     own = read_bodies(net.bodies[p])
-    for j in range(system.tables.shape[0]):
+    for j in range(network.tables.shape[0]):
         job = read_job(net.lines[net.joined[j]])
-        starts, ends = system.joints[j, BEGIN] >= 0, system.joints[j, END] >= 0
+        starts, ends = network.joints[j, BEGIN] >= 0, network.joints[j, END] >= 0
         set_right_side(job.work, job, read_other(job.tables[p]), starts, ends)
-    if system.right.shape[0] > 0:
-        own_right_sides(system, net, p)
-        put_right_sides(system, own.right, 1.0)
-        answer_right_sides(system, system.borders.shape[0])
-        put_right_sides(system, own.right, 0.0)
+    if network.right.shape[0] > 0:
+        own_right_sides(network, net, p)
+        put_right_sides(network, own.right, 1.0)
+        answer_right_sides(network, network.borders.shape[0])
+        put_right_sides(network, own.right, 0.0)
 
 
 @inner
-def answer(plane, space, system, net, p):
+def answer(plane, space, network, net, p):
     """Corrections of all other lines and bodies: in work.x of the lines of the run and in what its bodies work with."""
     if space is not None:
-        answer_joined(system, net, p)
+        answer_joined(network, net, p)
     for k in range(net.lone.shape[0]):
         job = read_job(net.lines[net.lone[k]])
         left = read_other(job.tables[p]).left
@@ -348,18 +348,18 @@ def answer(plane, space, system, net, p):
 
 
 @inner
-def hold_ends(system):
+def hold_ends(network):
     """Ends go nowhere by themselves, and arms are those of bodies as they are."""
-    points = system.net.shape[0]
-    for j in range(system.joints.shape[0]):
+    points = network.net.shape[0]
+    for j in range(network.joints.shape[0]):
         for k in range(2):
-            b = system.joints[j, k] - points
+            b = network.joints[j, k] - points
             if b >= 0:
-                rho = reach(system, j, k, b)
+                rho = reach(network, j, k, b)
                 for m in range(3):
-                    system.arms[j, k, m] = rho[m]
+                    network.arms[j, k, m] = rho[m]
             for m in range(3):
-                system.gaps[j, k, m] = 0.0
+                network.gaps[j, k, m] = 0.0
 
 
 # --- steps ------------------------------------------------------------------------------------------
@@ -429,7 +429,7 @@ def end_lines(plane, space, net, p, s):
 
 
 @inner
-def advance(plane, space, system, net, p, s):
+def advance(plane, space, network, net, p, s):
     """The other lines and bodies of a number from the beginning of the last step of the run to its end."""
     bodies = read_bodies(net.bodies[p])
     for l in range(net.lines.shape[0]):
@@ -438,8 +438,8 @@ def advance(plane, space, system, net, p, s):
         begin_other(space, job, other, s, old_of(job, other))
     if space is not None:
         load_bodies(bodies.numbers, bodies.loads, bodies.history, net.clock.now)
-        predict_body_rates(system, bodies, s)
-        place_fairleads(system, net, p, s)
+        predict_body_rates(network, bodies, s)
+        place_fairleads(network, net, p, s)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         other = read_other(job.tables[p])
@@ -451,11 +451,11 @@ def advance(plane, space, system, net, p, s):
             other = read_other(job.tables[p])
             leave_over(plane, space, job, other, s, new_of(job, job), old_of(job, other), new_of(job, other))
         if space is not None:
-            put_bodies(system, bodies)
-        answer(plane, space, system, net, p)
+            put_bodies(network, bodies)
+        answer(plane, space, network, net, p)
         correct_lines(space, net, p, s, k, count, wanted)
         if space is not None:
-            correct_body_rates(system, bodies.rates, s)
+            correct_body_rates(network, bodies.rates, s)
     if space is not None:
         find_body_rates(bodies, s)
     end_lines(plane, space, net, p, s)
@@ -467,17 +467,17 @@ def advance_tangents(plane, space, net):
     own = net.even
     if net.counts.parity == 0:
         own = net.odd
-    system = read_system(own)
-    task = task_of(system.asked)
+    network = read_network(own)
+    task = task_of(network.asked)
     task = with_radius(task, task.rho)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)
     if space is not None:
-        hold_ends(system)
+        hold_ends(network)
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         keep_own(plane, space, job, s, old_of(job, job), new_of(job, job))
     for p in range(net.bodies.shape[0]):
-        advance(plane, space, system, net, p, s)
+        advance(plane, space, network, net, p, s)
     return 0
 
 
@@ -502,9 +502,9 @@ def correct_beside(table):
     found.
     """
     net = read_tangents(table)
-    system, p, cv, ca = read_system(net.even), net.asked[0], net.by[0], net.by[1]
+    network, p, cv, ca = read_network(net.even), net.asked[0], net.by[0], net.by[1]
     if p < 0:
-        hold_ends(system)
+        hold_ends(network)
         for l in range(net.lines.shape[0]):
             job = read_job(net.lines[l])
             left_over_in_space(job.line, job.sea, job.ends, job.even.r, job.even, cv, ca, job.own, job.left)
@@ -512,6 +512,6 @@ def correct_beside(table):
     for l in range(net.lines.shape[0]):
         job = read_job(net.lines[l])
         leave_over_at_rest(job, read_other(job.tables[p]), cv, ca)
-    put_bodies(system, read_bodies(net.bodies[p]))
-    answer(None, 1, system, net, p)
+    put_bodies(network, read_bodies(net.bodies[p]))
+    answer(None, 1, network, net, p)
     return 0

@@ -130,9 +130,9 @@ NEARS_ITSELF = 16384
 PARTS_ITSELF = 32768
 HIDES_ITSELF = 65536
 COLLAPSES = 131072  # many steps are tiny
-ZONES_DUE = 262144  # of a system: zones of a line are to be looked at
-NODES_DUE = 524288  # of a system: a node enters or leaves at a winch
-LINES_NEAR = 1048576  # of a system: two lines are near each other, between which contact begins
+ZONES_DUE = 262144  # of a network: zones of a line are to be looked at
+NODES_DUE = 524288  # of a network: a node enters or leaves at a winch
+LINES_NEAR = 1048576  # of a network: two lines are near each other, between which contact begins
 
 # --- powers and work --------------------------------------------------------------------------------
 

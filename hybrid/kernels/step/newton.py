@@ -162,7 +162,7 @@ def with_radius(task, rho):
     rho = radius_of_step(rho, before, rho_before, task.dt)
     return Task(
         task.what, task.dt, before, rho, task.cv, task.ca, task.turning, task.limits, task.cut, rho_before, task.fixed
-    )  # fmt: skip
+    )
 
 
 class Job(NamedTuple):
