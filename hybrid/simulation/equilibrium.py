@@ -118,7 +118,9 @@ def equilibrium_of(network: Network, model: NetworkModel, t: float, friction: bo
         asked = _Asked(_network_of(network, own.names), own, t, own.body_numbers(t), friction)
         try:
             return _in_its_water(asked)
-        except LineFailed:
+        except LineFailed as failed:
+            if failed.outcome == Outcome.TURNS_LOST:  # another place may have others, which nobody asks for
+                raise
             for begin in asked.elsewhere():
                 with suppress(LineFailed):
                     return _in_its_water(asked._replace(begin=begin))

@@ -134,6 +134,8 @@ def test_product_of_sparse_rows(columns):
     np.testing.assert_allclose(out, 1.0 + dense @ x, rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.parametrize("below", [0, 1, 4])
+@pytest.mark.parametrize("seed", range(10))
 def test_definite_where_the_lowest_eigenvalue_is_positive(below, seed):
     """Random bands shifted to either side of zero, by more than round-off."""
     n, g = 9, np.random.default_rng(seed)
