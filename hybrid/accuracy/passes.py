@@ -50,7 +50,7 @@ from hybrid.accuracy.refinement import (
     times_the_cost,
 )
 from hybrid.accuracy.run_forecast import Budget
-from hybrid.accuracy.step_losses import LostBy, most_lost, uncertain_by_vibrations
+from hybrid.accuracy.step_losses import LostBy, uncertain_by_vibrations
 from hybrid.errors import ZONE_EVENTS, ComputationError, ResultError, SceneError
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import NAMED, ModelChoice, output_times, with_models
@@ -130,7 +130,7 @@ def write_errors(
 
     @cache
     def lost() -> Mapping[str, LostBy]:
-        from hybrid.accuracy.free_vibrations import lost_by_lines  # 0.1 s to import, and few runs need it
+        from hybrid.accuracy.free_vibrations import lost_by_lines  # 0.1 s to import
 
         return lost_by_lines(case.scene, control.standing)
 
@@ -191,7 +191,7 @@ def _of_line(case: Case, control: ErrorController, name: str, cpu: float, vibrat
                 yield full, begin, at_all_points(values, result.places) if along else values
 
     def doubts(largest: Mapping[str, float], bounds: Mapping[str, float] | None) -> list[tuple[str, str]]:
-        return uncertain_by_vibrations(most_lost(case.scene, scene, result), vibrations, result, largest, bounds)
+        return uncertain_by_vibrations(vibrations(), result, largest, bounds)
 
     def others(happened: Happened) -> tuple[dict[str, str | float | int], list[tuple[str, str]]]:
         found, notes = known(scene, line, result, errors, happened, doubts)

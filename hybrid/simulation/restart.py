@@ -494,6 +494,11 @@ def _refuse_more_out(before: Any, after: Any, until: float) -> None:
 def _check(last: LoadChange[Any], changed: Any, resolution: NetworkResolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
     _check_what_changes(last, changed, begin, end)
+    meet = sorted({*changed.meeting_pairs} - {*last.scene.meeting_pairs})
+    if meet:
+        expected = "lines between which the run computes contact from its start, or that stay out of each other's reach"
+        fix = "run the changed scene from its start"
+        raise _refused("contact", f"{' and '.join(meet[0])}, which reach each other then", expected, fix)
     old = build_network(last.scene, resolution)
     new = build_network(changed, resolution, old)
     for name, one, other, joints in zip(old.names, old.models, new.models, old.joints, strict=True):

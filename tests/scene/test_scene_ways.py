@@ -217,3 +217,11 @@ def test_lines_that_cannot_reach_each_other_are_no_pair(second: dict[str, Any], 
     assert (build_network(far).touching is not None) == meet
     named = hybrid.validate_scene(far.model_dump(exclude_none=True) | {"contact": {"between": [["line0", "line1"]]}})
     assert named.meeting_pairs == [("line0", "line1")]
+
+
+def test_a_change_that_brings_lines_into_reach_is_refused(tmp_path: Path) -> None:
+    """Contact between them is not computed by the run that goes on."""
+    hybrid.run(lines(2.0 * HALF_WAY + 5.0), tmp_path / "run.h5").close()
+    nearer = "points.b1.motion={travel: {by: [0, -9, 0], over: 3, begin: 1}}"
+    with pytest.raises(SceneError, match="line0 and line1, which reach each other then"):
+        hybrid.resume(tmp_path / "run.h5", until=5.0, start=1.0, settings=[nearer])

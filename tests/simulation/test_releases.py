@@ -355,3 +355,21 @@ def test_what_cannot_break_is_refused(lines: dict[str, Any], points: dict[str, A
     with pytest.raises(SceneError) as refused:
         hybrid.run(scene_break(lines, points))
     assert words in str(refused.value)
+
+
+def test_a_point_is_where_it_was_after_a_line_has_left_it() -> None:
+    """Stepped from outside: `point` had the place of the end that fell."""
+    rod = {"length": 5.5, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
+    line = {"sections": [rod], "model": "rod", "mesh": {"cells": 10}}
+    scene = {
+        "points": {"A": {"position": [0, 0, 0]}, "B": {"position": [5, 0, 0]}, "G": {"position": [-5, 0, 0]}},
+        "lines": {
+            "p": line | {"start": "A", "end": "B"},
+            "v": line | {"start": "G", "end": "A", "break_at": {"time": 0.1, "end": "end"}},
+        },
+        "time": {"duration": 0.4, "step": 0.02},
+    }
+    with hybrid.Simulation(scene) as sim:
+        sim.advance(0.4)
+        assert np.abs(sim.line("v").position[-1]).max() > 0.1
+        assert not np.concatenate(sim.point("A")[:2]).any()

@@ -13,7 +13,6 @@ from test_stepping import driven, heave, touchdown
 
 import hybrid
 from hybrid.accuracy import free_vibrations as f
-from hybrid.accuracy import passes
 from hybrid.accuracy import step_losses as losses
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state import books as b
@@ -332,50 +331,6 @@ def test_where_it_is_not_known_nothing_is_said(more):
     cable = {"sections": [{"length": 10.0 / 1.01, "mass": 1.01, "axial_stiffness": 1e4, "diameter": 0.03}]}
     assert lost(hybrid.validate_scene(taut(cable=cable)), 20)
     assert not lost(hybrid.validate_scene(taut(cable=cable, **more)), 20)
-
-
-def water(**drag):
-    """The environment and the section of a taut line under water."""
-    section = {"length": 10.0 / 1.01, "mass": 1.01, "axial_stiffness": 1e4, "diameter": 0.03, "bending_stiffness": 0.1}
-    cable = {"sections": [section | drag | {"added_mass": {"normal": 1.0}}]}
-    return {"environment": {"gravity": 0.5, "fluid": {"density": 1025}}, "cable": cable, "model": "rod"}
-
-
-def both(monkeypatch, scene):
-    """What steps of a run make of free vibrations at most, and what its modes tell, by quantity."""
-    seen = []
-    monkeypatch.setattr(passes, "uncertain_by_vibrations", lambda most, find, *_: seen.append((most, find())) or [])
-    hybrid.run(scene).close()
-    return seen[-1]
-
-
-@pytest.mark.parametrize("step", [0.05, 0.2])
-@pytest.mark.parametrize("motion", ["travel", "heave"])
-def test_under_water_it_is_no_more_than_drag_leaves(monkeypatch, motion, step):
-    """Of 89 random lines modes tell at most 0.84 of it (docs/errors.md)."""
-    scene = taut(**water(drag={"normal": 1.2})) | {"time": {"duration": 10.0, "step": step}}
-    if motion == "heave":
-        scene["ends"]["end"]["motion"] = {"heave": {"amplitude": 0.1, "period": 1.3}, "ramp": 1.3}
-    most, found = both(monkeypatch, scene | {"output": {"every": 0.2, "errors": True}})
-    parts = [found[name].error / most[name] for name in found]
-    assert len(found) == 6 and 1e-9 < max(parts) < 0.9
-
-
-@pytest.mark.parametrize("where", ["no drag", "no water", "above the water", "a body at its end", "an end that turns"])
-def test_where_drag_does_not_tell_modes_do(monkeypatch, where):
-    scene = taut(**water(**({} if where == "no drag" else {"drag": {"normal": 1.2}})))
-    if where == "no water":
-        scene["environment"] = {"gravity": 0.5, "fluid": {"density": 1025, "surface": -1.0}}
-    elif where == "above the water":
-        scene["environment"]["fluid"]["surface"] = -0.5
-    elif where == "a body at its end":
-        scene["ends"]["start"] = {"kind": "body", "mass": 20.0, "volume": 0.005}
-        scene["ends"]["end"]["position"] = [0, 0, 10]
-    elif where == "an end that turns":
-        motion = {"pitch": {"amplitude": 1.0, "period": 2.0}, "ramp": 2.0}
-        scene["ends"]["end"] = {"kind": "clamped", "position": [10, 0, 0], "tangent": [1, 0, 0], "motion": motion}
-    most, found = both(monkeypatch, scene | {"mesh": {"cells": 20}, "output": {"every": 0.5, "errors": True}})
-    assert most is None and found
 
 
 # --- Steps in real time: never more Newton iterations than allowed; what was cut short is said, counted and right
