@@ -57,6 +57,7 @@ def test_hanging_chain(mode, report):
     ("name", "beam", "roots", "most", "mode"),
     [*(("Cantilever", cantilever, CANTILEVER, 1e-3, k) for k in range(3)),
      *(("Free-free rod", free_beam, FREE_FREE, 3e-3, k) for k in range(2))],
+    ids=[*(f"cantilever-{k}" for k in range(3)), *(f"free-{k}" for k in range(2))],
 )  # fmt: skip
 def test_beam(name, beam, roots, most, mode, report):
     error = np.array([frequency(*beam(mode, n)) / roots[mode] ** 2 - 1 for n in (20, 40, 80)])
