@@ -9,24 +9,15 @@ docs/errors.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from itertools import pairwise
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from hybrid.accuracy.step_losses import (
-    MOST_PERIODS,
-    Factors,
-    Lost,
-    LostBy,
-    breaks_of,
-    gauss,
-    harmonic_until,
-    quiet_from,
-)
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import DAMPING
@@ -45,16 +36,80 @@ from hybrid.linear.matrices import (
 )
 from hybrid.linear.touching import Rest, rest_of
 from hybrid.model.network import NetworkResolution
+from hybrid.scene.motion_tables import Motion
 from hybrid.scene.root import Scene
-from hybrid.simulation.run_sample import Samples
+from hybrid.simulation.run_sample import END_FORCES, RunSample, Samples
+
+RAW = {shown: raw for raw, shown in END_FORCES.items()}
+UNITS = {
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", **dict.fromkeys(RAW, "N"),
+}  # fmt: skip
 
 # Lowest modes that are looked at, to a line; of several lines at most so many in all.
 MODES, MOST_MODES = 12, 48
+# A motion is integrated by Gauss's rule, in at least as many pieces as it has periods of a vibration.
+GAUSS = 8  # points of the rule
+FEWEST_PIECES = 8  # at least
+MOST_PERIODS = 200  # modes with more are left out: a ramp that is so long leaves nothing
 # w^2 below this part of the largest found is that of a motion that nothing holds.
 HELD = 1e-8
 # Times at which amplitudes are followed as they die; rate of that, of the velocity of a harmonic and its drag.
 DYING, HARMONIC = 60, 4.0 / (3.0 * pi)
+# Frequencies of a motion and of a vibration count as different by at least so many rad in the duration.
+CLOSE = 1.0
+# An error by steps that this makes is worth a word where it exceeds what is asked, and the error figure so many times;
+# where nothing is asked, this part of the largest value.
+TIMES_THE_FIGURE, PART = 1.5, 0.01
+ROWS = 20_000  # times at most; of longer runs some of theirs,
+BLOCK = 2000  # so many at a time
 PLACES = 40  # beside those at which a mode is largest
+
+
+class Lost(NamedTuple):
+    """What steps make of free vibrations in a quantity: its largest error, and the vibration that makes most of it."""
+
+    error: float  # m, N, N m or 1/m
+    amplitude: float  # of all of them together, in the same unit
+    period: float  # s
+    step: float  # s, that leaves an error of a tenth of this
+
+
+LostBy = Mapping[str, Lost]  # by quantity
+
+
+def uncertain_by_vibrations(
+    found: LostBy, result: RunSample, errors: Mapping[str, float], allowed: Mapping[str, float] | None
+) -> list[tuple[str, str]]:
+    """The event that says so where steps lose more of free vibrations than error figures show.
+
+    found: what they lose; errors: figures, by quantity; allowed: errors that are asked, None: nothing is.
+    """
+    worst, of = 1.0, ""
+    for name, lost in found.items():
+        values = result.values.get(RAW.get(name, name))
+        if name not in errors or values is None or (allowed is not None and name not in allowed):
+            continue
+        if allowed is None:
+            sizes = np.asarray(values)
+            sizes = np.linalg.norm(sizes, axis=-1) if name == "position" or name in RAW else sizes
+            least = PART * float(np.abs(sizes).max())
+        else:
+            least = allowed[name]
+        least = max(least, TIMES_THE_FIGURE * errors[name])
+        if least > 0.0 and lost.error > worst * least:
+            worst, of = lost.error / least, name
+    if not of:
+        return []
+    lost, unit = found[of], UNITS[of]
+    steps = np.diff(result.forces[:, 0])
+    text = (
+        f"{of.replace('end_force_', 'force at the ').replace('_', ' ')}: a free vibration with a period of "
+        f"{lost.period:.2g} s is left by the ramp or move of an end, up to {lost.amplitude:.2g} {unit}, which hardly "
+        f"anything damps; steps of {float(np.median(steps)):.2g} s make it late or lose it, an error of up to "
+        f"{lost.error:.2g} {unit}, which the error figure ({errors[of]:.2g} {unit}) does not see; time.step: "
+        f"{lost.step:.2g} shows it, damping ends it, and a longer ramp or move leaves less of it"
+    )
+    return [("error uncertain", text)]
 
 
 def lost_by_lines(asked: Any, result: Samples) -> Mapping[str, LostBy]:
@@ -72,7 +127,7 @@ def lost_by_lines(asked: Any, result: Samples) -> Mapping[str, LostBy]:
 def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:
     """By line and quantity, what steps that end at `times` (n,) s make of free vibrations about an equilibrium."""
     motions = asked.motions
-    begins = [quiet_from(x) for x in motions]
+    begins = [_quiet_from(x) for x in motions]
     quiet = max((x for x in begins if x is not None), default=0.0)
     fluid = asked.environment.fluid
     still = fluid is None or fluid.waves is None
@@ -85,9 +140,22 @@ def lost_vibrations(asked: Scene, rest: Callable[[], Rest], times: Floats) -> Ma
         return {}
     if not _is_steady(found):
         return {}
-    breaks = sorted({0.0, *(x for motion in motions for x in breaks_of(motion) if x < quiet)})
+    breaks = sorted({0.0, *(x for motion in motions for x in _breaks(motion) if x < quiet)})
     radius = asked.time.rho_inf if asked.time is not None else 0.5
     return Vibrations(found).lost(breaks, min(quiet, float(times[-1])), np.asarray(times), radius)
+
+
+def _quiet_from(motion: Motion) -> float | None:
+    """When a motion is one of harmonics alone, s; None: never."""
+    if motion.file is not None or motion.follow is not None or motion.vessel is not None:
+        return None
+    return max(_breaks(motion))
+
+
+def _breaks(motion: Motion) -> tuple[float, ...]:
+    """Times, s, at which something in a motion begins or ends."""
+    travel = motion.travel
+    return (0.0, motion.ramp or 0.0, *(() if travel is None else (travel.begin, travel.begin + travel.over)))
 
 
 def _is_steady(rest: Rest) -> bool:
@@ -235,7 +303,7 @@ class Vibrations:
         q'' + w^2 q = -drive u'': integral of u'' exp(-i w t) until then, less what harmonics go on to add.
         """
         w = self.w
-        t, weights = gauss(breaks, quiet, float(w[fits].max()))
+        t, weights = _gauss(breaks, quiet, float(w[fits].max()))
         waves = np.exp(-1j * np.outer(t, w))
         total = np.zeros(w.size, complex)
         for x, model, drive in zip(self.lines, self.rest.models, self.drive, strict=True):
@@ -251,8 +319,16 @@ class Vibrations:
                 continue
             for o, excited in zip(self.omegas, x.excited, strict=True):
                 unit = np.einsum("kc,kcm->m", np.hstack([excited.shifts, excited.turns]), drive)
-                total -= harmonic_until(quiet, o, w, unit, duration)
+                total -= _harmonic_until(quiet, o, w, unit, duration)
         return np.asarray(np.abs(total) / w)
+
+
+def _harmonic_until(quiet: float, o: float, w: Floats, unit: Floats, duration: float) -> Floats:
+    """Integral until `quiet` (s) of  u'' exp(-i w t)  for  u = Re(unit exp(-i o t))  that has grown slowly, (m,)."""
+    near = np.where(o < w, -1.0, 1.0) * np.maximum(np.abs(o - w), CLOSE / duration)
+    up = unit.conj() * np.exp(1j * near * quiet) / (1j * near)
+    down = unit * np.exp(-1j * (o + w) * quiet) / (-1j * (o + w))
+    return np.asarray(-o * o / 2.0 * (up + down))
 
 
 def _drags(x: LoadedLine, part: Floats, forced: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
@@ -277,3 +353,61 @@ def _places(each: Floats) -> Floats:
     """Rows of shapes (places, m) that are looked at."""
     even = np.linspace(0, len(each) - 1, min(PLACES, len(each))).round().astype(int)
     return np.unique(np.concatenate([even, each.argmax(axis=0)]))
+
+
+def _gauss(breaks: list[float], quiet: float, w: float) -> tuple[Floats, Floats]:
+    """Times until `quiet`, s, and their weights in an integral over motions and vibrations of up to w; and `quiet`."""
+    x, each = np.polynomial.legendre.leggauss(GAUSS)
+    times, weights = [np.zeros(0)], [np.zeros(0)]
+    for a, b in pairwise([x for x in breaks if x < quiet] + [quiet]):
+        ends = np.linspace(a, b, max(FEWEST_PIECES, int(w * (b - a) / pi)) + 1)
+        half = 0.5 * (ends[1] - ends[0])
+        times.append((ends[:-1, None] + half * (1.0 + x)).ravel())
+        weights.append(np.tile(half * each, ends.size - 1))
+    return np.concatenate([*times, [quiet]]), np.concatenate(weights)
+
+
+@cache
+def _factors(radius: float) -> tuple[Floats, Floats]:
+    """Angles of a step, rad, and the logs of factors at them, of a spectral radius."""
+    at = np.geomspace(1e-3, 1e3, 600)  # rad to a step
+    am, af = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
+    ga = 0.5 - am + af
+    be = 0.25 * (1.0 - am + af) ** 2
+    w2 = at**2
+    below = (1.0 - am) + w2 * (1.0 - af) * be
+    new = np.stack([-w2, -w2 * (1.0 - af), -am - w2 * (1.0 - af) * (0.5 - be)], axis=-1) / below[:, None]
+    one = np.ones_like(w2)
+    rows = [np.stack(x, axis=-1) for x in ((one, one, (0.5 - be) * one), (0 * one, one, (1.0 - ga) * one))]
+    matrix = np.stack([rows[0] + be * new, rows[1] + ga * new, new], axis=1)
+    roots = np.linalg.eigvals(matrix)
+    root = roots[np.arange(w2.size), roots.imag.argmax(axis=1)]
+    return at, np.log(np.abs(root)) + 1j * (np.abs(np.angle(root)) - at)
+
+
+class Factors:
+    """By what generalized-alpha multiplies a free vibration in a step, over what the vibration itself does: its log."""
+
+    def __init__(self, radius: float) -> None:
+        self._at, self._log = _factors(radius)
+
+    def of(self, angle: Floats) -> Floats:
+        """Of steps of so many radians; of short ones as their cube."""
+        inside, cube = np.maximum(angle, self._at[0]), np.minimum(angle / self._at[0], 1.0) ** 3
+        return np.asarray(np.interp(inside, self._at, self._log) * cube)
+
+    def drift(self, w: Floats, t: Floats) -> tuple[Floats, Floats]:
+        """(times, m) since the start, and these times, s: of all steps, or of so many as fit into memory."""
+        every = -(-len(t) // ROWS)
+        parts, now = [np.zeros((1, w.size), complex)], np.zeros(w.size, complex)
+        for a in range(0, len(t) - 1, every * BLOCK):
+            steps = self.of(np.outer(np.diff(t[a : a + every * BLOCK + 1]), w))
+            sums = now + np.cumsum(np.add.reduceat(steps, np.arange(0, len(steps), every)), axis=0)
+            parts, now = [*parts, sums], sums[-1]
+        return np.vstack(parts), np.append(t[:-1:every], t[-1])
+
+    def step(self, w: float, duration: float) -> float:
+        """The step, s, that leaves a tenth of the vibration wrong at the end."""
+        angle = np.geomspace(1e-3, 1.0, 200)
+        fits = np.abs(1.0 - np.exp(self.of(angle) * (w * duration / angle))) <= 0.1
+        return float(angle[fits].max(initial=angle[0]) / w)

@@ -56,7 +56,7 @@ from hybrid.scene.points import (
     Name,
     Point,
 )
-from hybrid.scene.schema import Asked, LineScene, SceneTables, may_meet
+from hybrid.scene.schema import Asked, LineScene, SceneTables, pairs_in_reach
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -299,7 +299,7 @@ class Network(SceneTables, Asked):
         if self.contact is None or self.contact.between is not None:
             return self.touching_pairs
         scenes = {name: self.scene_of(name) for name in self.lines}
-        return [(a, b) for a, b in self.touching_pairs if may_meet(scenes[a], scenes[b])]
+        return [*pairs_in_reach(scenes, self.touching_pairs)]
 
     def first_place(self, point: str) -> Triple:
         """Where a point is held at rest, or first looked for [m]; not of a free end that says nothing of it."""

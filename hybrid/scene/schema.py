@@ -7,10 +7,11 @@ A missing table is None, and None costs nothing downstream.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from hybrid.errors import SceneError
@@ -253,14 +254,22 @@ def may_reach(scene: LineScene, obstacle: Obstacle) -> bool:
     return all(any(obstacle.distance(x.middle) <= x.radius + apart for x in balls) for balls in _covers(scene))
 
 
-def may_meet(scene: LineScene, other: LineScene) -> bool:
-    """Whether two lines may touch each other; where no bound is known they may."""
-    apart = sum(_spare(x) for x in (scene, other))
-    for balls, others in zip(_covers(scene), _covers(other), strict=False):
-        near = [*others]
-        if not any(math.dist(x.middle, y.middle) <= x.radius + y.radius + apart for x in balls for y in near):
-            return False
-    return True
+def pairs_in_reach(scenes: Mapping[str, LineScene], pairs: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Those of these pairs of lines that may touch each other; where no bound is known they may.
+
+    scenes: of the lines by name.
+    """
+    covers, spare = {}, {name: _spare(x) for name, x in scenes.items()}
+    for name, scene in scenes.items():
+        each = [[*balls] for balls in _covers(scene)]
+        covers[name] = [(np.array([x.middle for x in balls]), np.array([x.radius for x in balls])) for balls in each]
+    for a, b in pairs:
+        apart = spare[a] + spare[b]
+        for (x, r), (y, q) in zip(covers[a], covers[b], strict=False):
+            if not (np.linalg.norm(x[:, None] - y, axis=2) <= r[:, None] + q + apart).any():
+                break
+        else:
+            yield a, b
 
 
 def _spare(scene: LineScene) -> float:

@@ -396,8 +396,10 @@ class SteppedPoints(SettableObstacles):
 
         NaN where an end holds no direction.
         """
-        assert self._only is not None
-        return np.array([self.point(name).frame for name in self._places])
+        model = self._only
+        frames = model.ends.values.frame.reshape(2, 3, 3).copy()
+        frames[[k for k in (0, 1) if not model.line.element[-k]]] = np.nan
+        return frames
 
     @one_thread
     def forces(self, name: str | None = None) -> Any:

@@ -13,7 +13,6 @@ from test_stepping import driven, heave, touchdown
 
 import hybrid
 from hybrid.accuracy import free_vibrations as f
-from hybrid.accuracy import step_losses as losses
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state import books as b
 from hybrid.linear.touching import rest_of
@@ -274,19 +273,19 @@ def test_what_is_foretold_is_what_steps_lose(where):
 def test_steps_of_the_trapezoidal_rule():
     """Its radius is 1: it loses nothing, and turns by 2 atan(w dt/2)."""
     angle = np.array([0.01, 0.1, 1.0, 3.0])
-    found = losses.Factors(1.0).of(angle)
+    found = f.Factors(1.0).of(angle)
     assert np.abs(found.real).max() < 1e-9
     assert found.imag == pytest.approx(2.0 * np.arctan(0.5 * angle) - angle, rel=1e-3)
-    assert losses.Factors(0.0).of(np.array([100.0])).real[0] < -3.0  # lost in a step
+    assert f.Factors(0.0).of(np.array([100.0])).real[0] < -3.0  # lost in a step
 
 
 def test_long_runs_are_looked_at_in_parts(monkeypatch):
     w, t = np.array([1.0, 3.0]), np.cumsum(np.concatenate([[0.0], np.linspace(0.01, 0.1, 1000)]))
-    whole, times = losses.Factors(0.5).drift(w, t)
+    whole, times = f.Factors(0.5).drift(w, t)
     assert np.array_equal(times, t)
-    monkeypatch.setattr(losses, "ROWS", 100)
-    monkeypatch.setattr(losses, "BLOCK", 7)
-    some, times = losses.Factors(0.5).drift(w, t)
+    monkeypatch.setattr(f, "ROWS", 100)
+    monkeypatch.setattr(f, "BLOCK", 7)
+    some, times = f.Factors(0.5).drift(w, t)
     assert len(times) <= 102
     assert some == pytest.approx(whole[np.searchsorted(t, times)], rel=1e-9)
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import passes
+from hybrid.accuracy import api
 from hybrid.errors import ResultError
 from hybrid.exports.api import export
 from hybrid.simulation.case import Case
@@ -623,7 +623,7 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
 
     output = LineResult.output
     monkeypatch.setattr(LineResult, "output", shown)
-    monkeypatch.setattr(passes, "Case", Spy)
+    monkeypatch.setattr(api, "Case", Spy)
     monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
     result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")
     kinds = {tuple(mesh.kinds) for mesh in result.mesh}

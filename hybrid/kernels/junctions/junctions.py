@@ -367,13 +367,8 @@ def gather_right_sides(network, m):
 
     Of points and bodies themselves it is `right`; ends have nowhere to go.
     """
-    tables, joints, seats, arms, points = (
-        network.tables,
-        network.joints,
-        network.seats,
-        network.arms,
-        network.net.shape[0],
-    )
+    tables, joints, seats, arms = network.tables, network.joints, network.seats, network.arms
+    points = network.net.shape[0]
     S, G, A, row, tensions = network.S, network.G, network.A, 0, count_tensions(network.joints)
     for r in range(m):
         A[r, m] = 0.0
@@ -418,13 +413,8 @@ def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
 @inner
 def correct_all(network, gaps, m):
     """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
-    tables, joints, seats, arms, points = (
-        network.tables,
-        network.joints,
-        network.seats,
-        network.arms,
-        network.net.shape[0],
-    )
+    tables, joints, seats, arms = network.tables, network.joints, network.seats, network.arms
+    points = network.net.shape[0]
     columns, work, A, q = network.columns, network.work, network.A, network.q
     row, tensions = 0, count_tensions(joints)
     for b in range(work.shape[0]):
