@@ -585,6 +585,14 @@ NumberRows = Annotated[NDArray[np.int64], 2]
 NumberBlocks = Annotated[NDArray[np.int64], 3]
 Arguments = TypeVar("Arguments")
 
+# What the arrays of such annotations hold (what an alias of numpy is made of differs between its versions).
+NUMBERS: dict[Any, type] = {
+    NDArray[np.float64]: np.float64,
+    NDArray[np.int64]: np.int64,
+    NDArray[np.int8]: np.int8,
+    NDArray[np.bool_]: np.bool_,
+}
+
 
 def blanks(of: type[Arguments]) -> Callable[[], Arguments]:
     """What makes arguments of a kernel with the types that all have: nothing in arrays, zeros, and defaults."""
@@ -601,7 +609,7 @@ def _blank_value(of: Any) -> Any:
     if isinstance(of, type):
         return of()  # a number, or numbers with names
     kind, dimensions = get_args(of) if hasattr(of, "__metadata__") else (of, 1)
-    return np.zeros((0,) * dimensions, get_args(get_args(kind)[1])[0])
+    return np.zeros((0,) * dimensions, NUMBERS[kind])
 
 
 def copied(value: Any) -> Any:
