@@ -110,31 +110,3 @@ def test_a_zone_split_in_two_of_the_same_kind(whole, split):
     a = hybrid.run(scene("hybrid", model={"kind": "zones", "zones": whole}, initial=straight))
     b = hybrid.run(scene("hybrid", model={"kind": "zones", "zones": split}, initial=straight))
     assert_alike(a, b, MOVING)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_a_section_split_in_two_alike(model):
-    halves = [
-        dict(SECTIONS[0], length=0.3),
-        dict(SECTIONS[0], length=0.5),
-        *[dict(SECTIONS[1], length=x) for x in (0.33, 0.87)],
-    ]
-    assert_alike(hybrid.run(released(model)), hybrid.run(released(model, sections=halves)), MOVING)
-
-
-def test_far_from_the_origin():
-    """One kilometre away the increments carry the motion: the same to 1e-9 m, which is 1e4 roundings of 1 km."""
-    straight = {"kind": "straight", "direction": [0.2, 0.1, -1.0]}
-    near = scene("hybrid", ends=_ends([0, 0, 0]), initial=straight)
-    far = scene("hybrid", ends=_ends([1000.0, -2000.0, 500.0]), initial=straight)
-    a, b = hybrid.run(near), hybrid.run(far)
-    assert np.abs(b.position - a.position - np.array([1000.0, -2000.0, 500.0])).max() < 1e-9 * 1e3
-    assert np.abs(b.tension - a.tension).max() < 1e-6 * np.abs(a.tension).max()
-
-
-def _ends(offset):
-    position = [float(x) for x in offset]
-    return {
-        "start": {"kind": "clamped", "position": position, "tangent": [0.2, 0.1, -1], "normal": [0, 1, 0]},
-        "end": {"kind": "free", "force": [6.0, 3.0, -4.0]},
-    }

@@ -129,6 +129,15 @@ NETWORKS = {
     "a body with members": tables_with(spar(), {"time.duration": 3.0, "output": {"every": 0.3}}),
     "clamped to bodies": tables_with(clamped(), {"time.duration": 1.0, "output": {"every": 0.1}}),
     "breaks": tables_with(BREAKS, {"time.duration": 1.0}),
+    "a clamp breaks": tables_with(
+        mooring(),
+        {
+            "time.duration": 1.0,
+            "output": {"every": 0.1},
+            "lines.hose.connections": {"end": {"tangent": [0.5, 0, 1]}},
+            "lines.hose.break_at": {"time": 0.5},
+        },
+    ),
     "zones that move": slackening(time={"duration": 2.5, "step": 0.02}),
     "cells that follow": followed(time={"duration": 1.5, "step": 0.02}),
     "starts as placed": between_springs(**{"lines.upper.model": "adaptive", "time.duration": 0.2}),

@@ -75,26 +75,6 @@ def test_a_master_in_ten_lines_gets_the_forces_of_a_simulation() -> None:
     assert runpy.run_path(str(EXAMPLES / "10_fmu_master.py"))["main"]() < 1e-7 * 3e4
 
 
-def test_steps_are_taken_again_from_a_saved_state(unit: Path, tmp_path: Path) -> None:
-    with running(unit, tmp_path / "open") as (cable, number):
-        place, force = (
-            [number["end.position.z"], number["end.velocity.z"]],
-            [number["end.force.x"], number["end.force.z"]],
-        )
-        for k in range(5):
-            cable.setFloat64(place, [0.001 * k**2, 0.04 * k])
-            step(cable, k)
-        saved = cable.getFMUState()
-        found = []
-        for height in (0.03, 0.02, 0.03):
-            cable.setFMUState(saved)
-            cable.setFloat64(place, [height, 0.2])
-            step(cable, 5)
-            found.append(cable.getFloat64(force))
-        assert found[0] == found[2] != found[1]
-        cable.freeFMUState(saved)
-
-
 LINES = """
 environment: {fluid: {density: 1025}}
 points:

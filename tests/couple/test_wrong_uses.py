@@ -1,7 +1,4 @@
-"""A hundred wrong uses of each interface beside Simulation: an error in words, no crash, and it goes on unchanged.
-
-`tests/simulation/test_stepping.py` has those of `hybrid.Simulation`.
-"""
+"""A hundred wrong uses of each interface: an error in words, no crash, and it goes on unchanged."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ import pytest
 
 import hybrid
 from hybrid.couple import moordyn
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
 DECK = Path(__file__).parents[1] / "data" / "moordyn" / "three_lines.txt"
 PLACES = [40.0, 0.0, -14.0, -20.0, 34.64, -14.0, -20.0, -34.64, -14.0]
@@ -29,6 +26,9 @@ NO_NAMES = ["", "middle", None, 0, 1.5, nan, [], ["line1"], {}, object(), True, 
             np.zeros(2), "line1 ", "anchor"]  # fmt: skip
 NO_VECTORS = ["abc", nan, [1, 2], [1, 2, 3, 4], [1, nan, 3], [1, 2, "x"], {}, object(), np.zeros((3, 3)), [[1], [2], [3]],
               [None] * 3, [inf, 0, 0], 1.0, [1j, 0, 0], [True, {}, 0], b"abc", [], [[]], np.zeros((1, 3)), "1 2 3"]  # fmt: skip
+NO_FRAMES = ["x", nan, np.zeros((3, 3)), -np.eye(3), 2 * np.eye(3), np.full((3, 3), nan), np.eye(2), [1, 2, 3], object(),
+             np.diag([1, 1, -1]), {}]  # fmt: skip
+NO_ENDS = ["middle", 0, None, 1, "START", [], object(), b"end"]
 NO_NUMBERS = ["abc", nan, STILL[:8], [*STILL, 0.0], [nan] * 9, [inf, *STILL[1:]], {}, object(), [[], []], [None] * 9,
               ["x"] * 9, 1.0, [1j] * 9, None, b"abc", [], [{}] * 9, np.zeros((2, 9))]  # fmt: skip
 NO_INDICES = [0, -1, 99, 1.0, "1", None, nan, [], [1], {}, object(), b"1", 1j, inf, 10**30, (1,), np.zeros(2), True]
@@ -42,7 +42,15 @@ def refused(uses: list[Callable[[], Any]]) -> int:
     return len(uses)
 
 
-# --- several lines -------------------------------------------------------------------------------
+# --- one cable, and several lines ----------------------------------------------------------------
+
+
+def cable(duration: float = 1.0, cells: int = 10) -> hybrid.Simulation:
+    tables: dict[str, Any] = cable_scene(
+        {"length": 10, "mass": 1, "axial_stiffness": 1e5, "bending_stiffness": 5}, clamped_at([0, 0, 0], [1, 0, 0]),
+        "free", model="rod", mesh=cells, time=(duration, 0.05)
+    )  # fmt: skip
+    return hybrid.Simulation(tables)
 
 
 def network(duration: float = 1.0) -> hybrid.Simulation:
@@ -112,10 +120,24 @@ def several(broken: bool) -> hybrid.Simulation:
     return hybrid.Simulation(tables)
 
 
-def uses_of_a_system(s: hybrid.Simulation) -> Iterator[Callable[[], Any]]:
-    for x in NO_TIMES:
-        yield lambda x=x: s.advance(x)
-        yield lambda x=x: s.restore(x)
+def uses_of_a_cable(s: hybrid.Simulation, other: Any) -> Iterator[Callable[[], Any]]:
+    for x in NO_ENDS:
+        yield lambda x=x: s.set_end(x, PLACE)
+        yield lambda x=x: s.set_force(x, PLACE)
+        yield lambda x=x: s.release(x)
+    for x in NO_VECTORS:
+        yield lambda x=x: s.set_end("start", x)
+        yield lambda x=x: s.set_end("start", PLACE, x)
+        yield lambda x=x: s.set_force("end", x)
+        yield lambda x=x: s.set_force("end", [9.0, 0.0, 0.0], x)
+    for x in NO_FRAMES:
+        yield lambda x=x: s.set_end("start", PLACE, frame=x)
+    yield lambda: s.set_end("end", PLACE)
+    yield lambda: s.set_force("start", PLACE)
+    yield lambda: s.release("end")
+
+
+def uses_of_a_system(s: hybrid.Simulation, other: Any) -> Iterator[Callable[[], Any]]:
     for x in NO_NAMES:
         yield lambda x=x: s.set_point(x, PLACE)
         yield lambda x=x: s.point(x)
@@ -126,40 +148,75 @@ def uses_of_a_system(s: hybrid.Simulation) -> Iterator[Callable[[], Any]]:
         yield lambda x=x: s.set_point("point4", PLACE, x)
 
 
-def test_wrong_uses_of_several_lines() -> None:
-    with network() as plain:
-        plain.advance(0.2)
-        expected = plain.line("line1").position
-    with network() as asked:
+def uses_of_both(s: hybrid.Simulation, other: Any) -> Iterator[Callable[[], Any]]:
+    """other: what `save` of another Simulation has returned."""
+    for x in NO_TIMES:
+        yield lambda x=x: s.advance(x)
+    for x in [*NO_TIMES, 1, other]:
+        yield lambda x=x: s.restore(x)
+
+
+def places(simulation: hybrid.Simulation) -> Any:
+    return next(iter(simulation.result().each_line()))[1].position[-1]
+
+
+# What makes one, how it is used wrongly, and what is read of it.
+BOTH = pytest.mark.parametrize(
+    ("made", "uses", "read"),
+    [(cable, uses_of_a_cable, lambda s: s.state), (network, uses_of_a_system, lambda s: s.point("point4"))],
+    ids=["cable", "network"],
+)
+
+
+@BOTH
+def test_wrong_uses_of_a_simulation(made: Any, uses: Any, read: Any) -> None:
+    with made() as plain:
+        plain.advance(0.5)
+        expected = places(plain)
+    with made() as asked, made() as other:
         asked.advance(0.1)
-        count = refused(list(uses_of_a_system(asked)))
+        saved = other.save()
+        count = refused([*uses(asked, saved), *uses_of_both(asked, saved)])
         assert asked.t == 0.1
-        asked.advance(0.2)
-        assert np.array_equal(asked.line("line1").position, expected)
+        asked.advance(0.5)
+        assert np.array_equal(places(asked), expected)
     print(f"{count} wrong uses of Simulation")
     assert count > 100
-    assert refused([lambda: asked.advance(0.5), lambda: asked.set_point("point4", PLACE)]) == 2
-    asked.close()
 
 
-def test_two_threads_in_several_lines() -> None:
-    """A second thread is refused in words, and the first goes on; repeated until both have met."""
-    with network(30.0) as lines:
+@BOTH
+def test_one_that_is_over_says_so(made: Any, uses: Any, read: Any) -> None:
+    with made() as closed:
+        saved = closed.save()
+    of_cable = (lambda: closed.set_force("end", [0, 0, 1]), lambda: closed.release("start"))
+    own = of_cable if made is cable else (lambda: closed.set_point("point4", PLACE),)
+    for use in (closed.step, closed.save, lambda: closed.restore(saved), lambda: closed.advance(0.5), *own):
+        with pytest.raises(ValueError, match="the simulation is over"):
+            use()
+    closed.close()
+
+
+@BOTH
+def test_two_threads_are_told_apart(made: Any, uses: Any, read: Any) -> None:
+    """A second thread is refused in words, and the first goes on as alone; repeated until both have met."""
+    with made(30.0) as busy, made(30.0) as alone:
         found: list[str] = []
         for k in range(1, 60):
-            busy = threading.Thread(target=lines.advance, args=(0.5 * k,))
-            busy.start()
-            while busy.is_alive():
-                for use in (lambda: lines.point("point4"), lambda: lines.line("line1")):
+            other = threading.Thread(target=busy.advance, args=(0.5 * k,))
+            other.start()
+            while other.is_alive():
+                for use in (busy.save, lambda: read(busy), lambda k=k: busy.advance(0.5 * k)):
                     try:
                         use()
                     except ValueError as error:
                         found.append(str(error))
-            busy.join()
-            assert lines.t == pytest.approx(0.5 * k)
+            other.join()
+            assert busy.t == pytest.approx(0.5 * k)
+            alone.advance(0.5 * k)
             if any("another thread" in text for text in found):
                 break
         assert any("another thread" in text for text in found)
+        assert np.array_equal(places(busy), places(alone))
 
 
 # --- MoorDyn's functions -------------------------------------------------------------------------

@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -203,3 +204,17 @@ def spread(seed: int, count: int, **ranges: Any) -> Iterator[dict[str, Any]]:
             columns[name] = [values[int(p * len(values))] for p in places]
     for k in range(count):
         yield {name: column[k] for name, column in columns.items()}
+
+
+Family = Callable[[], Iterator[Case]]
+
+
+def each(*values: Iterable[Any]) -> Callable[[Callable[..., Iterator[Case]]], Family]:
+    """Make a family of what makes the cases of one combination of values."""
+    every = [*product(*values)]
+    return lambda one: lambda: (case for given in every for case in one(*given))
+
+
+def drawn(seed: int, count: int, **ranges: Any) -> Callable[[Callable[..., Iterator[Case]]], Family]:
+    """Make a family of what makes the cases of one draw of `spread`."""
+    return each(spread(seed, count, **ranges))

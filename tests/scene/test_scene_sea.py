@@ -246,7 +246,6 @@ CASES = {
     "bottom over top": (SEA, "bottom: -80.0", "bottom: §80.0", "environment.fluid.current.bottom", "negative"),
     "bottom over surface": (SEA, "top: -1.0, bottom: -80.0", "bottom: §80.0", "environment.fluid.current.bottom", "0 m, the surface"),
     "exponent": (SEA, "exponent: 0.2", "exponent: §0", "environment.fluid.current.exponent", "> 0"),
-    "ramp of the current": (SEA, "veer: 30.0, ramp: 5.0", "veer: 30.0, ramp: §-5.0", "environment.fluid.current.ramp", "sign"),
     # --- waves
     "waves without surface": (SEA_TOO, f"surface: 0.0\n    waves: {REGULAR}", f"waves: {REGULAR}", "environment.fluid.surface", "add `surface: 0` (m)"),
     "waves of no kind": (SEA_TOO, REGULAR, "§{height: 2, period: 7}", "environment.fluid.waves.kind", "add `kind: regular`"),
@@ -267,7 +266,6 @@ CASES = {
     # --- the seabed
     "stiffnes": (SEA, "slope: [0.01, -0.02], stiffness", "slope: [0.01, -0.02], §stiffnes: 1, stiffness", "environment.seabed.stiffnes", "did you mean stiffness?"),
     "mu": (SEA, "damping: 500.0", "damping: 500.0, §mu: 0.3", "environment.seabed.mu", "did you mean friction: {axial: ..., lateral: ...}?"),
-    "negative friction": (SEA_LIST, "friction: 0.4", "friction: §-0.4", "environment.seabed.friction", ">= 0"),
     "half a friction": (SEA_LIST, "friction: 0.4", "friction: §{axial: 0.3}", "environment.seabed.friction.lateral", "add `lateral: ...`"),
     "normal friction": (SEA_LIST, "friction: 0.4", "friction: {axial: 0.3, lateral: 0.3, §normal: 0.4}", "environment.seabed.friction.normal", "did you mean lateral?"),
     "one slope": (SEA, "slope: [0.01, -0.02]", "slope: §0.01", "environment.seabed.slope", "`slope: [0.01, 0]`"),
@@ -289,7 +287,6 @@ CASES = {
     "a volume that sinks": (SEA_TOO, "volume: 0.2, mass: 20.0", "volume: §0.01, mass: 20.0", "cable.attachments[0].volume", "use kind: clump"),
     "ballast without mass": (SEA_TOO, "buoyancy: -5.0, mass: 8.0", "buoyancy: §-5.0", "cable.attachments[1].buoyancy", "at least 0 N/m"),
     "beyond the end": (SEA, "at: 75.0", "at: §151.0", "cable.attachments[0].at", "150 m"),
-    "before the start": (SEA, "at: 75.0", "at: §-1", "cable.attachments[0].at", "sign"),
     "over the end": (SEA, "range: [20.0, 40.0]", "range: [20.0, §151.0]", "cable.attachments[2].range[1]", "150 m"),
     "backwards": (SEA, "range: [20.0, 40.0]", "range: §[40.0, 20.0]", "cable.attachments[2].range", "[from, to]"),
     "over a point": (SEA, "range: [20.0, 40.0]", "range: §30", "cable.attachments[2].range", "two numbers"),
@@ -343,7 +340,6 @@ CASES = {
     "follow waves that jump": (SEA, "depth: 100.0, ramp: 18.0", "depth: 100.0, ramp: §0.1", "environment.fluid.waves.ramp", "follows the waves"),
     "a guided end that travels": (OCEAN, f"pinned, position: [205, 0, 0], motion: {HEAVE}", "guided, tangent: [1, 0, 0], motion: {travel: §{by: [1, 0, 0], over: 20}}", "ends.end.motion.travel", "clamped"),
     "no harmonic in the list": (OCEAN, HEAVE, "{heave: §[], ramp: 3}", "ends.end.motion.heave", "at least one entry"),
-    "inside the list": (OCEAN, HEAVE, "{heave: [{amplitude: 1, period: 8}, {amplitude: 1, period: §-8}], ramp: 16}", "ends.end.motion.heave[1].period", "sign"),
     "a list without ramp": (OCEAN, HEAVE, "§{heave: [{amplitude: 0, period: 8}, {amplitude: 1, period: 9}]}", "ends.end.motion", "give `ramp: 18`"),
     "a list too fast for the step": (change(OCEAN, HEAVE, "{heave: [{amplitude: 1, period: 8}, {amplitude: 1, period: 0.1}], ramp: 16}"), "step: 0.02", "step: §0.02", "time.step", "of ends.end.motion.heave[1]"),
     "torn by a travel": (OCEAN, HEAVE, "{travel: §{by: [300, 0, 0], over: 20}}", "ends.end.motion.travel", "a shorter way"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,14 @@ def as_run(force: np.ndarray, resolution: Resolution, at_start: float = 1.0) -> 
     kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
     found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
     return replace(found, resolution=resolution, forces=steps)
+
+
+def judged(sample: Any, tension: Any, free: bool = True, part: bool = True) -> OneLine:
+    """A controller that has judged irregular runs, asked for so much tension: a part, or N; free: cells and steps."""
+    asked = RequestedAccuracy(None, None, tension) if part else RequestedAccuracy(None, tension, None)
+    control = OneLine(asked, Free(free, free, False), sample, sample, irregular=True)
+    control.start(FINENESS)
+    return control
 
 
 def values(found: dict[str, RunSample], name: str) -> list[float]:
@@ -141,18 +150,13 @@ def test_motion_that_turns_out_irregular_after_its_last_refinement():
     assert control.line.next_resolution() is None
 
 
-def test_a_line_that_stays_taut_is_judged_at_every_instant():
-    """Where nothing snaps, runs that do not converge are too coarse."""
-    control = estimated(False, slack=4e3)
-    control.start(FINENESS)
-    assert not control.line.irregular and "accuracy missed" in {kind for kind, _ in control.notes}
-
-
-def test_snaps_of_which_steps_show_nothing_are_judged_at_every_instant():
-    """One step from slack to taut: that runs differ says that steps are too long."""
-    control = estimated(False, rise=2)
+@pytest.mark.parametrize("runs", [{"slack": 4e3}, {"rise": 2}, {"instant": True}])
+def test_what_is_judged_at_every_instant(runs):
+    """Where nothing snaps, runs that do not converge are too coarse; of snaps of one step steps are too long; if asked."""
+    control = estimated(False, **runs)
     control.start(FINENESS)
     assert not control.line.irregular
+    assert "slack" not in runs or "accuracy missed" in {kind for kind, _ in control.notes}
 
 
 def test_one_slow_fall_is_that_of_coarse_runs():
@@ -169,12 +173,6 @@ def test_one_slow_fall_is_that_of_coarse_runs():
     assert not control.line.irregular
 
 
-def test_every_instant_can_be_asked():
-    control = estimated(False, instant=True)
-    control.start(FINENESS)
-    assert not control.line.irregular
-
-
 def test_a_largest_force_by_chance_is_not_judged():
     """All runs agree but for one snap, whose size depends on nothing."""
     snaps = {(1.0, 1): 9e3, (0.5, 2): 7e3, (0.5, 4): 9.4e3, (0.25, 4): 7.2e3}
@@ -184,9 +182,7 @@ def test_a_largest_force_by_chance_is_not_judged():
         force[2000] = snaps[resolution.fineness, resolution.every]
         return as_run(force, resolution)
 
-    asked = RequestedAccuracy(None, None, 0.01)
-    control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
-    control.start(FINENESS)
+    control = judged(sample, 0.01)
     assert control.line.scattered == ["end_force_end"]  # the only one there
     assert [kind for kind, _ in control.notes] == ["irregular motion", "largest force uncertain", "windows uncertain"]
     assert len(control.runs) == 4
@@ -204,9 +200,7 @@ def test_chance_in_means_over_windows_is_seen_from_window_to_window(scatter, unc
         force[40::80] += scatter * rng.normal(size=len(force[40::80])) + 2e3
         return as_run(force, resolution)
 
-    asked = RequestedAccuracy(None, None, 0.01)  # 200 N
-    control = OneLine(asked, Free(False, False, False), sample, sample, irregular=True)
-    control.start(FINENESS)
+    control = judged(sample, 0.01, free=False)  # 200 N
     chance = control.line.statistics["windows_largest"].chance
     assert chance == pytest.approx(2.0 * scatter * np.sqrt(2.0 / 50.0), rel=0.4)
     assert ("windows uncertain" in {kind for kind, _ in control.notes}) == uncertain
@@ -227,9 +221,7 @@ def test_a_largest_force_within_the_scatter_of_windows_is_not_refined(scatter, r
         force[2000] = snaps.get((resolution.fineness, resolution.every), 20e3)
         return as_run(force, resolution)
 
-    asked = RequestedAccuracy(None, None, 0.02)
-    control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
-    control.start(FINENESS)
+    control = judged(sample, 0.02)
     assert (len(control.runs) > 4) == repeated
     assert bool(control.line.scattered) != repeated
 
@@ -249,11 +241,9 @@ def test_a_largest_force_that_snaps_may_exceed_is_not_judged(scatter, uncertain)
             force[k - 3], force[k] = 100.0, 11e3 + scatter * float(rng.uniform(-1.0, 0.0))
         return as_run(force, resolution, 0.5)
 
-    asked = RequestedAccuracy(None, None, 0.01)
-    control = OneLine(asked, Free(False, False, False), sample, sample, irregular=True)
-    control.start(FINENESS)
+    control = judged(sample, 0.01, free=False)
     assert ("largest force uncertain" in {kind for kind, _ in control.notes}) == uncertain
-    again = OneLine(asked, Free(False, False, False), sample, sample, irregular=True).line
+    again = OneLine(RequestedAccuracy(None, None, 0.01), Free(False, False, False), sample, sample, irregular=True).line
     tree = control.line.checkpoint() | {"estimate": None, "statistics": {}}
     again.restore(unpack(pack(tree)), SCENE, output_points(one_line(SCENE)))
     np.testing.assert_array_equal(again.excess, control.line.excess)
@@ -305,9 +295,7 @@ def test_means_over_windows_that_do_not_converge_are_not_refined():
         force[2000] = 20e3
         return as_run(force, resolution)
 
-    asked = RequestedAccuracy(None, 100.0, None)
-    control = OneLine(asked, Free(True, True, False), sample, sample, irregular=True)
-    control.start(FINENESS)
+    control = judged(sample, 100.0, part=False)
     assert len(control.runs) == 4
     missed = [text for kind, text in control.notes if kind == "accuracy missed"]
     assert len(missed) == 1 and "windows' largest" in missed[0] and "several seeds" in missed[0]

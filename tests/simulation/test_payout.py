@@ -16,10 +16,6 @@ from hybrid.errors import SceneError
 from hybrid.kernels.reel.paid_length import length_at
 from hybrid.model.payout import law_of
 from hybrid.scene.ends import Payout
-from hybrid.simulation import line_result
-from hybrid.simulation.diagnostics import Diagnostics
-from hybrid.simulation.line_result import LineResult
-from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
@@ -68,12 +64,17 @@ def test_turns_between_held_ends_stay_while_the_line_grows() -> None:
     assert np.abs(result["torque"][:, 0] - twist).max() < 0.02 * np.abs(twist).max()
 
 
+@pytest.mark.parametrize("clamp", [False, True], ids=["pinned", "clamped"])
 @pytest.mark.parametrize("dimension", [None, 3])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_hanging_line_weighs_what_is_out_less_its_inertia(dimension: int | None, sign: float) -> None:
-    """T = w L - m L dc/dt at the winch, to round-off, through nodes that enter and leave."""
+def test_a_hanging_line_weighs_what_is_out_less_its_inertia(sign: float, dimension: int | None, clamp: bool) -> None:
+    """T = w L - m L dc/dt at the winch, to round-off, through nodes that enter and leave, and ride with a clamp."""
     more = {"dimension": dimension} if dimension else {}
-    result = hybrid.run(hanging({"rates": [[0, 0], [20, sign * 1.0]]}, 18.0, **more))
+    scene = hanging({"rates": [[0, 0], [20, sign * 1.0]]}, 18.0, **more)
+    if clamp:
+        scene = clamped(scene | {"model": "rod"}, [0.0, 0.0, 1.0])
+        scene["cable"]["sections"][0] |= {"bending_stiffness": 20.0, "torsional_stiffness": 20.0}
+    result = hybrid.run(scene)
     length = 40.0 + sign * 0.025 * result.t**2
     assert np.abs(result["payout/length"] - length).max() < 1e-12 * 40.0
     force = result["reaction_end"][1:, 2]
@@ -81,18 +82,6 @@ def test_a_hanging_line_weighs_what_is_out_less_its_inertia(dimension: int | Non
     np.testing.assert_allclose(result["payout/power"], -result["payout/rate"] * result["reaction_end"][:, 2], rtol=1e-9)
     out = result["s"][None] > result["payout/length"][:, None]  # on the reel
     assert not out.any() or np.abs(result["position"][out]).max() < 1e-12
-
-
-@pytest.mark.parametrize("dimension", [None, 3])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_behind_a_clamp_it_weighs_the_same(dimension: int | None, sign: float) -> None:
-    """Nodes that ride with the clamp have the inertia of the material that they pass."""
-    more = {"dimension": dimension} if dimension else {}
-    scene = clamped(hanging({"rates": [[0, 0], [20, sign * 1.0]]}, 18.0, model="rod", **more), [0.0, 0.0, 1.0])
-    scene["cable"]["sections"][0] |= {"bending_stiffness": 20.0, "torsional_stiffness": 20.0}
-    result = hybrid.run(scene)
-    length = 40.0 + sign * 0.025 * result.t[1:] ** 2
-    assert np.abs(result["reaction_end"][1:, 2] / (2.0 * length * (G - sign * 0.05)) - 1.0).max() < 1e-9
 
 
 def test_the_layer_that_rides_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -315,15 +304,6 @@ def test_a_winch_at_the_start_does_as_one_at_the_end(scene: dict[str, Any]) -> N
             np.testing.assert_allclose(mirror[name][::-1], found[name], rtol=1e-8, atol=1e-9, err_msg=name)
 
 
-def test_at_the_start_a_length_is_set_from_python() -> None:
-    with hybrid.Simulation(exchanged(hanging({"longest": 60.0}, 5.0))) as sim:
-        while sim.t < 4.9:
-            sim.set_payout(0.2 * (sim.t + 0.05))
-            sim.step()
-        assert sim.length == pytest.approx(40.0 + 0.1 * sim.t**2, abs=1e-9)
-        assert sim.forces().start[2] == pytest.approx(-2.0 * sim.length * (G - 0.2), rel=1e-9)
-
-
 # --- resume and Python ------------------------------------------------------------------------------
 
 
@@ -343,16 +323,18 @@ def test_a_resume_does_not_pay_out_more_than_the_result_has_points_for(tmp_path:
         hybrid.resume(tmp_path / "a.h5", until=10.0)
 
 
-def test_a_length_set_from_python_is_that_of_the_scene() -> None:
+@pytest.mark.parametrize("side", ["end", "start"])
+def test_a_length_set_from_python_is_that_of_the_scene(side: str) -> None:
     """Rates set at every step: the same line as one whose scene gives them, linear in each step."""
-    rates = {"rates": [[0, 0], [20, 1.0]]}
-    given = hybrid.run(hanging(rates, 10.0, dimension=3))
-    with hybrid.Simulation(hanging({"longest": 60.0}, 10.0)) as sim:
+    scenes = [hanging({"rates": [[0, 0], [20, 1.0]]}, 10.0, dimension=3), hanging({"longest": 60.0}, 10.0)]
+    law, outside = scenes if side == "end" else map(exchanged, scenes)
+    given = hybrid.run(law)
+    with hybrid.Simulation(outside) as sim:
         while sim.t < 9.99:
             sim.set_payout(0.05 * (sim.t + 0.05))
             sim.step()
         assert sim.length == pytest.approx(40.0 + 0.025 * sim.t**2, abs=1e-9)
-        assert sim.forces().end[2] == pytest.approx(-given["reaction_end"][-1, 2], rel=1e-9)
+        assert getattr(sim.forces(), side)[2] == pytest.approx(-given[f"reaction_{side}"][-1, 2], rel=1e-9)
         result = sim.result()
     np.testing.assert_allclose(result["payout/length"], given["payout/length"], atol=1e-9)
 
@@ -495,26 +477,6 @@ def test_a_far_end_that_is_let_go_stays_free_when_nodes_enter() -> None:
     moment = np.linalg.norm(result["moment_start"], axis=1)
     assert moment[result.t < 1.9].min() > 1.0
     assert moment[result.t > 2.1].max() < 1e-9
-
-
-@pytest.mark.parametrize("model", ["catenary", "rod"])
-def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of lines of another number of cells wait for each other: nothing that is written depends on it."""
-    scene = sagging(model, EA=2e6, EI=2e4 if model == "rod" else None, duration=12.0)
-    together = hybrid.run(scene)
-    calls = []
-    judge = Diagnostics.joined_outputs
-    monkeypatch.setattr(Diagnostics, "joined_outputs", lambda *x: (calls.append(len(x[3])), judge(*x))[1])
-    again = hybrid.run(scene)
-    assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
-    monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
-    monkeypatch.setattr(LineResult, "outputs_join", False)
-    monkeypatch.setattr(line_result, "WAITING", 1)
-    alone = hybrid.run(scene)
-    for name in (x for x in together.names if x != "steps/cpu" and together[x].dtype.kind == "f"):
-        for other in (again, alone):
-            assert np.array_equal(together[name], other[name], equal_nan=True), name
-    assert [*together.zones] == [*alone.zones] and [x.kind for x in together.events] == [x.kind for x in alone.events]
 
 
 def test_an_equilibrium_and_a_plan_need_no_step() -> None:

@@ -16,7 +16,7 @@ from test_result_first import make_rough
 
 import hybrid
 from hybrid.simulation import case as cases
-from hybrid.simulation.progress import PRE_RUN, REFINEMENT, Progress
+from hybrid.simulation.progress import REFINEMENT, Progress
 from hybrid.store.checkpoint import read_before
 from hybrid.store.hdf5_file import opened
 
@@ -130,18 +130,6 @@ def test_into_another_file(made: Callable[[str], Path], tmp_path: Path, monkeypa
     assert (tmp_path / "run.h5").read_bytes() == before
     assert differences(tmp_path / "whole.h5", tmp_path / "other.h5") == []
     assert len(rows(tmp_path)) == 3
-
-
-def test_nothing_is_left_where_there_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    Stopping(monkeypatch)
-
-    def stop(progress: Progress) -> None:
-        assert progress.name == PRE_RUN
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene(*CASES["rods"]), tmp_path / "run.h5", progress=stop)
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.long

@@ -361,9 +361,3 @@ def test_a_strand_lies_on_another_on_a_seabed() -> None:
     assert result["position"][:, :, 2].min() > -0.05 - 0.5 * WIDTH
     put_in = np.abs(result["work/end"]).max() + np.abs(result["work/start"]).max() + np.ptp(result["energy/potential"])
     assert result["work/scheme"].max() < 1e-2 * put_in
-
-
-def test_a_start_within_itself_is_refused() -> None:
-    r = hairpin(60.0, 0.3 * WIDTH)
-    with pytest.raises(hybrid.SceneError, match=r"s = \S+ m and s = \S+ m are \S+ m apart"):
-        flying(r, 0.01, 0.1)

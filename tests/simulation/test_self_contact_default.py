@@ -125,25 +125,11 @@ def test_a_hose_whose_end_is_lowered_touches_itself() -> None:
     assert "accuracy missed" in kinds(result)
 
 
-@pytest.mark.parametrize(
-    ("more", "why"),
-    [
-        ({"contact": {"self": False}}, "contact.self: false"),
-        ({"model": "catenary"}, "catenaries that stay"),
-        ({"dimension": 2}, "dimension: 2"),
-        ({"ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
-                   "end": {"kind": "pinned", "position": [3.97, 0, 0]}}}, "of a loop"),
-    ],
-)  # fmt: skip
-def test_where_it_cannot_be_it_is_off_and_says_why(more: dict[str, Any], why: str) -> None:
-    scene = hybrid.validate_scene(led_through(**more))
-    reach = self_reach(one_line(scene))
-    assert not reach.asked and not reach.may and why in reach.why
-    entry = next(x for x in build(one_line(scene)).contents if x.what == "contact of the line with itself")
-    assert not entry.on and why in entry.why
-
-
-def test_without_a_diameter_it_is_off() -> None:
+def test_where_it_cannot_be_it_is_off_and_says_why() -> None:
+    """In a plane that is asked for, and without a diameter; other reasons are in test_system_contact.py."""
+    scene = led_through(dimension=2)
+    (entry,) = (x for x in hybrid.plan(scene).contents if x.what == "contact of the line with itself")
+    assert not entry.on and "dimension: 2" in entry.why
     scene = led_through()
     del scene["cable"]["sections"][0]["diameter"]
     assert "diameter" in self_reach(one_line(hybrid.validate_scene(scene))).why

@@ -113,33 +113,6 @@ def test_end_forces_at_a_free_point_are_those_of_the_lines_alone() -> None:
         assert line[f"steps/end_force_{end}"] == pytest.approx(force[1:], rel=1e-6)
 
 
-def test_energy_of_all_lines_closes_with_second_order() -> None:
-    """Energy that no work accounts for falls as the square of the step, summed over the lines (work at points cancels)."""
-    left = []
-    for step in (0.1, 0.05):
-        result = hybrid.run(mooring(time={"duration": 8.0, "step": step, "rho_inf": 1.0}, output={"every": 0.4}))
-        lines = result.lines.values()
-        put_in = max(float(np.abs(x["work/end"]).max()) for x in lines)
-        left.append(max(abs(sum(float(x["work/scheme"][k]) for x in lines)) for k in range(21)) / put_in)
-    assert left[0] < 0.02 and left[1] < 0.4 * left[0]
-
-
-def test_a_file_is_what_memory_is(tmp_path: Path, moved: hybrid.Result) -> None:
-    target = tmp_path / "float.h5"
-    written = hybrid.run(mooring(), target)
-    with hybrid.open(target) as again:
-        assert again.file == target
-        for name, line in again.lines.items():
-            assert np.array_equal(line.tension, moved.lines[name].tension)
-            assert line.dims("tension") == ("t", "s") and line.units["tension"] == "N"
-    (tmp_path / "again.yaml").write_text(written.scene_text)
-    assert hybrid.load_scene(tmp_path / "again.yaml") == hybrid.Scene.model_validate(mooring())
-    hybrid.export(written.lines["hose"], tmp_path / "hose.csv")
-    assert (tmp_path / "hose.csv").stat().st_size > 5_000
-    with pytest.raises(ResultError, match="nothing left to do"):
-        hybrid.resume(target)
-
-
 def test_chains_on_the_seabed_bear_what_they_weigh() -> None:
     """A float on two chains: what the anchors and the bed bear is the weight less the lift of the float, to 1e-6."""
     chain = {"length": 190, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 1e7}

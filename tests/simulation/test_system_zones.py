@@ -164,27 +164,12 @@ def test_against_rods(three: hybrid.Result) -> None:
     assert np.abs(there - here).max() < 0.002 * 60.0
 
 
-def test_a_line_breaks_while_zones_move() -> None:
-    scene = mooring(time={"duration": 1.5, "step": 0.02})
-    scene["lines"]["north"]["break_at"] = {"time": 0.8}
-    found = hybrid.run(scene)
-    assert found.status == "complete" and any(e.kind == "end released" for e in found.events)
-
-
 def test_what_is_not_computed_is_refused() -> None:
     given = mooring()
     given["lines"]["east"] = given["lines"]["east"] | {"connections": {"end": {"tangent": [0, 0, 1]}}}
     with pytest.raises(SceneError) as refused:
         hybrid.run(given)
     assert "connections" in refused.value.complaints[0].where
-
-
-def test_an_equilibrium_has_zones_too() -> None:
-    scene = mooring()
-    del scene["time"]
-    found = hybrid.static(scene)
-    kinds = {zone.kind for line in found.lines.values() for zone in line.zones[0]}
-    assert kinds == {"rod", "catenary"}
 
 
 def asks_for_the_middle(look: hybrid.NodeState) -> np.ndarray:

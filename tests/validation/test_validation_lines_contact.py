@@ -119,19 +119,6 @@ def test_what_lines_do_to_each_other_is_booked(moved: Any) -> None:
     assert max(np.abs(x["work/scheme"]).max() for x in (upper, lower)) < 2e-3 * put_in
 
 
-def test_a_scene_turned_and_mirrored_has_that_result(moved: Any) -> None:
-    c, s = np.cos(0.7), np.sin(0.7)
-    M = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]])
-    tables = lowered()
-    for point in tables["points"].values():
-        point["position"] = (M @ point["position"]).tolist()
-        if "motion" in point:
-            point["motion"]["travel"]["by"] = (M @ point["motion"]["travel"]["by"]).tolist()
-    other = hybrid.run(tables)
-    for name, line in moved.lines.items():
-        np.testing.assert_allclose(other.lines[name].position, line.position @ M.T, atol=1e-5)
-
-
 def test_it_stays_where_it_rests_on_another() -> None:
     result = hybrid.run(crossing(0.1, time={"duration": 0.3, "step": 0.01}, output={"points": 81, "every": 0.1}))
     for line in result.lines.values():

@@ -118,49 +118,6 @@ def test_on(name):
     assert near[-1] * CELL - 0.01 <= first.s_b <= (near[-1] + 3.01) * CELL
 
 
-def test_on_at_a_clamp():
-    """sqrt(EI/T) 2 sin(angle/2) passes the tolerance while the clamp turns; the cable there was a catenary."""
-    result = ran("clamp")
-    T = tensions(result)[:, 0]
-    yaw = np.radians(20.0) * np.sin(2 * np.pi * result.times / 10.0)
-    x = np.minimum(result.times / 2.0, 1.0)
-    angle = yaw * x**3 * (10 - 15 * x + 6 * x * x)
-    ratio = np.sqrt(EI / T) * 2 * np.sin(np.abs(angle) / 2) / 0.015
-    assert rods(result, 0) == [] and ratio.max() > 1.3
-    split = comes(result)
-    assert split, "a catenary at a clamp must ask to become a rod when the clamp turns"
-    k = output_at(result, split[0].t)
-    assert split[0].text.startswith("clamp") and split[0].s_a == 0.0
-    assert ratio[k] == pytest.approx(1.0, abs=0.1)
-
-
-def test_on_where_a_cable_leaves_the_bed():
-    """The rod begins about the edge of contact, where bend is EI w/T^2, and edge half of it."""
-    result = ran("edge")
-    first = comes(result)[0]
-    assert first.text.startswith(("edge", "bend"))
-    k = output_at(result, first.t)
-    edge = result.touchdown[k][1]
-    assert first.s_a - CELL <= edge <= first.s_b + CELL
-    T = tensions(result)[k - 1]
-    there = T[int(edge / CELL)]
-    assert EI * 10.0 / there**2 / 0.016 == pytest.approx(1.0, abs=0.25)  # the tension varies by some % about the edge
-
-
-def test_on_by_torque():
-    """A clamp turns a taut cable until M^2/(4 EI T) passes a half: it must be a rod before, or no torque ever builds up.
-
-    A catenary has no twist, so what asks must be the turn of the ends against each other.
-    """
-    rod = hybrid.run(turning(model={"force_rod": [[0, LENGTH]]}))
-    middle = CELLS
-    ratio = rod.torque[:, middle] ** 2 / (4 * EI * rod.tension[:, middle]) / 0.5
-    assert ratio[0] < 1e-9 and ratio[-1] > 2.0
-    result = hybrid.run(turning(model={}))
-    assert [(z.kind, z.s_a, z.s_b) for z in result.zones[-1]] == [("rod", 0.0, LENGTH)]
-    assert result.torque[-1, middle] == pytest.approx(rod.torque[-1, middle], rel=0.01)
-
-
 # --- off ------------------------------------------------------------------------------------------------
 
 
