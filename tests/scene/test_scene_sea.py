@@ -10,80 +10,17 @@ from scene_texts import AT_REST, OCEAN, SEA, SEA_LIST, SEA_TOO, SEA_UNIFORM, cha
 from hybrid.errors import SceneError
 from hybrid.scene.analysis import CatenaryModel, Equilibrium
 from hybrid.scene.attachments import Clump, Float, Modules
-from hybrid.scene.cable import Cable, Environment, Fluid, Section
-from hybrid.scene.ends import Body, Ends, Free, Pinned
-from hybrid.scene.motion_tables import Harmonic, Load, Motion, Travel
-from hybrid.scene.read import parse_scene, scene_text, validate_scene
-from hybrid.scene.root import Scene
+from hybrid.scene.cable import Fluid
+from hybrid.scene.ends import Body, Free, Pinned
+from hybrid.scene.motion_tables import Load, Motion
+from hybrid.scene.read import parse_scene, validate_scene
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, Friction, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.start_checks import net_weight
-from hybrid.scene.wave_theory import JonswapWaves, wavenumber
+from hybrid.scene.wave_theory import wavenumber
 from hybrid.scene.waves import RegularWaves
 from tests.scenes import cable_scene, pinned_at
 
 # --- what is read ------------------------------------------------------------------------------
-
-
-def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
-    built = Scene(
-        environment=Environment(
-            fluid=Fluid(
-                density=1025.0,
-                current=PowerLawCurrent(
-                    velocity=(0.5, 0.1, 0.0), top=-1.0, bottom=-80.0, exponent=0.2, veer=30.0, ramp=5.0
-                ),
-                surface=0.0,
-                waves=JonswapWaves(
-                    height=3.0, period=9.0, gamma=2.0, direction=180.0, seed=7, components=50, depth=100.0, ramp=18.0
-                ),
-            ),
-            seabed=Seabed(
-                z=-100.0,
-                slope=(0.01, -0.02),
-                stiffness=5e3,
-                damping=500.0,
-                friction=Friction(axial=0.3, lateral=0.5),
-            ),
-        ),
-        cable=Cable(
-            sections=(Section(length=150.0, mass=5.0, diameter=0.05, drag={"normal": 1.2}),),
-            attachments=(
-                Float(at=75.0, buoyancy=60.0, mass=4.0, drag_area=0.02, added_mass=3.0, height=0.2),
-                Clump(at=100.0, mass=30.0, volume=0.004, drag_area=0.05, added_mass=2.0, height=0.3),
-                Modules(range=(20.0, 40.0), volume=0.02, mass=8.0, drag_area=0.3, added_mass=12.0),
-            ),
-        ),
-        ends=Ends(
-            start=Pinned(
-                position=(0.0, 0.0, 0.0),
-                motion=Motion(
-                    heave=(Harmonic(amplitude=0.5, period=8.0), Harmonic(amplitude=0.2, period=5.0, phase=40.0)),
-                    velocity=(0.5, 0.0, 0.0),
-                    travel=Travel(by=(10.0, 0.0, -2.0), over=30.0, begin=5.0),
-                    follow="waves",
-                    ramp=16.0,
-                ),
-            ),
-            end=Body(
-                initial_guess=(60.0, 0.0, -80.0),
-                mass=100.0,
-                volume=0.09,
-                height=0.5,
-                shape="cylinder",
-                drag_area=0.4,
-                added_mass=40.0,
-                thrust=(20.0, 0.0, 0.0),
-            ),
-        ),
-        initial=Equilibrium(guess="catenary", friction="settled"),
-        model=CatenaryModel(),
-        time={"duration": 60.0, "step": 0.05},
-        output={"elevation": ((0.0, 0.0), (20.0, 5.0))},
-    )
-    assert parse_scene(SEA) == built
-    assert parse_scene(scene_text(built)) == built
-    assert built.ends.held() == {"start": (0.0, 0.0, 0.0)}
-    assert built.ends.initial_guesses() == {"end": (60.0, 0.0, -80.0)} and list(built.ends.bodies()) == ["end"]
 
 
 def test_currents_of_every_form() -> None:

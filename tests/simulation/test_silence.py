@@ -32,28 +32,6 @@ def run(*tables):
     return hybrid.run(tables_of(*tables))
 
 
-def test_a_bend_at_a_clamp_that_the_mesh_does_not_see():
-    """10 km with cells of 100 m leave their clamp within sqrt(EI/T), half a metre: the moment is a thousandth."""
-    riser = section(length=1e4, mass=20.0, bending_stiffness=1e3, axial_stiffness=1e9)
-    ends = {"start": clamped_at([0, 0, -6000], [1, 0, 0]), "end": pinned_at(5000, 0, 0)}
-    assert "unresolved bend" in kinds(static(riser, {"ends": ends, "model": "rod", "mesh": {"cells": 100}}))
-    assert "unresolved bend" not in kinds(static(riser, {"ends": ends, "model": "rod"}))  # graded by itself
-    fine = static(riser, {"ends": ends, "model": "rod", "mesh": {"cells": 4000, "ratio": 1000}})
-    assert "unresolved bend" not in kinds(fine)
-
-
-def test_a_twist_beyond_half_a_turn_a_cell_stops():
-    roll = {"roll": {"amplitude": 1500, "period": 4}, "ramp": 1}
-    ends = {"start": clamped_at([0, 0, 0], [1, 0, 0]), "end": clamped_at([1, 0, 0], [1, 0, 0], motion=roll)}
-    shaft = section(**TAUT | {"bending_stiffness": 1.0})
-    start = {"initial": {"kind": "straight", "direction": [1, 0, 0]}, "time": {"duration": 1, "step": 0.001}}
-    with pytest.raises(hybrid.ComputationError) as stop:
-        run(NO_GRAVITY, shaft, {"ends": ends, "model": "rod", "mesh": {"cells": 4}}, start)
-    assert stop.value.outcome is hybrid.Outcome.TWISTED_TOO_FAR
-    result = run(NO_GRAVITY, shaft, {"ends": ends, "model": "rod"}, start)
-    assert result.torque[-1, 50] == pytest.approx(0.01 * math.radians(1500), rel=1e-3)
-
-
 def test_a_tiny_moment_does_not_switch_off_the_judgement_of_stability():
     ends = {"start": clamped_at([0, 0, 0], [0, 0, 1]), "end": {"kind": "free", "moment": [0, 0, 1e-30]}}
     column = section(length=1.0, mass=0.1, bending_stiffness=1e-3)
@@ -70,18 +48,6 @@ def test_warn_finds_the_taut_solution_first():
     )
     assert found.tension.min() > 0.0
     assert not kinds(found)
-
-
-def test_a_motion_faster_than_the_step_is_refused():
-    heave = {"heave": {"amplitude": 0.3, "period": 0.1}, "ramp": 1}
-    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(10, 0, 0, motion=heave)}
-    line = section(length=11.0, mass=1.0, axial_stiffness=1e6)
-    with pytest.raises(hybrid.SceneError, match=r"time\.step\n.*\n.*at most a sixth of the shortest period, 0\.0166 s"):
-        run(line, {"ends": ends, "model": "catenary", "time": {"duration": 5, "step": 0.1}})
-    short = {"surge": {"amplitude": 0.1, "period": 2, "phase": 90}, "ramp": 1e-3}
-    ends["end"] = pinned_at(10, 0, 0, motion=short)
-    with pytest.raises(hybrid.SceneError, match="it is a jump"):
-        run(line, {"ends": ends, "model": "catenary", "time": {"duration": 1, "step": 0.1}})
 
 
 @pytest.mark.parametrize("normal", [[0, 0, 1], [0, 1, 0], [0, -1, 0], [0, 1, 1]])
@@ -102,14 +68,6 @@ def test_two_normals_twist_a_line_with_joints_as_they_twist_a_rod(swivel):
     joined, rod = (run(NO_GRAVITY, section(**TAUT), {"ends": ends, "model": x}, start).torque for x in (zones, "rod"))
     np.testing.assert_allclose(joined, rod, rtol=1e-9, atol=1e-12)
     assert (np.abs(rod).min() > 0.01) is not swivel
-
-
-def test_a_strut_that_stands_by_symmetry_is_noted():
-    push = {"surge": {"amplitude": -0.02, "period": 4}, "ramp": 4}
-    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(1, 0, 0, motion=push)}
-    line = section(length=1.0, mass=0.1, bending_stiffness=0.01, axial_stiffness=1e5)
-    result = run(NO_GRAVITY, line, {"ends": ends, "model": "rod", "time": {"duration": 5, "step": 0.01}})
-    assert "unstable" in kinds(result)
 
 
 def test_round_off_of_points_is_no_blow():
@@ -251,33 +209,6 @@ def test_a_flat_cable_turns_onto_its_soft_side():
         flat = section(length=2.0, mass=0.1, bending_stiffness=stiffness, torsional_stiffness=1e-3)
         lowest.append(static(flat, {"ends": ends, "model": "rod"}).position[0, :, 2].min())
     assert lowest[0] == pytest.approx(lowest[1], rel=1e-9)
-
-
-def test_ends_that_coincide_and_lines_that_float():
-    loop = section(length=2.0, mass=0.1, axial_stiffness=1e5)
-    hung = static(loop, {"ends": {"start": pinned_at(0, 0, 0), "end": pinned_at(0, 0, 0)}, "model": "catenary"})
-    assert hung.position[0, :, 2].min() == pytest.approx(-1.0, abs=1e-3)
-    water = {"environment": {"fluid": {"density": 1000}}}
-    up = static(
-        water,
-        section(length=2.0, mass=0.1, diameter=0.05),
-        {"ends": {"start": pinned_at(0, 0, 0), "end": "free"}, "model": "catenary"},
-    )
-    assert up.position[0, -1] == pytest.approx([0, 0, 2])
-
-
-def test_folds():
-    """A catenary folded back onto itself hangs in two strands; a rod cannot start like that."""
-    fold = {
-        "initial": {"kind": "points", "points": [[0, 0, 0], [0, 0, -1], [0, 0, 0]]},
-        "time": {"duration": 0.01, "step": 0.001},
-    }
-    ends = {"ends": {"start": pinned_at(0, 0, 0), "end": "free"}}
-    line = section(length=2.0, mass=0.1, bending_stiffness=0.01)
-    with pytest.raises(hybrid.ComputationError):  # the loose strand falls freely: no tension in it
-        run(line, ends, fold, {"model": "catenary"})
-    with pytest.raises(hybrid.SceneError, match="corner of 180 deg"):
-        run(line, ends, fold, {"model": "rod"})
 
 
 @pytest.mark.parametrize(

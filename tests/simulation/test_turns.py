@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 import hybrid
 from hybrid.model.build import build
 from hybrid.model.network import build_network
-from hybrid.scene.motion import EndMotion
-from hybrid.scene.motion_tables import Motion
 from hybrid.scene.read import one_line
 from hybrid.scene.root import in_full
 from hybrid.simulation import equilibrium
@@ -74,15 +71,6 @@ def test_turns_count_from_the_normal():
 def test_turns_of_a_clamp_without_a_normal():
     result = hybrid.static(taut(first={"normal": None}, second={"normal": None, "turns": 4}))
     np.testing.assert_allclose(result["torque"][0], torque_of(4.0), rtol=1e-9)
-
-
-def test_turns_of_a_sagging_rod():
-    """Two stiffnesses in series: the torque is one, and the twists add up to the turns (discretisation: 1 %)."""
-    soft = SECTION | {"length": 40.0, "axial_stiffness": 1e6, "torsional_stiffness": 2.0, "mass": 0.1}
-    stiff = soft | {"length": 60.0, "torsional_stiffness": 5.0}
-    scene = taut(cable={"sections": [soft, stiff]}, second={"turns": 6, "position": [90, 0, 0]}, environment={})
-    result = hybrid.static(scene)
-    np.testing.assert_allclose(result["torque"][0], 12.0 * math.pi / (40.0 / 2.0 + 60.0 / 5.0), rtol=1e-2)
 
 
 def test_too_few_cells_for_the_turns_are_refused():
@@ -186,35 +174,6 @@ def test_two_turns_of_yaw(every, step):
     assert np.abs(np.abs(result.torque[swung]) - truth[:, None]).max() < 1e-3 * 0.6 * math.pi
 
 
-def test_a_rotated_scene_is_the_rotated_scene(tmp_path):
-    """Roll, pitch and yaw together are Rz Ry Rx about fixed axes: turned as a whole, they are a rotation vector."""
-    angles = {"roll": (100.0, 3.0), "pitch": (40.0, 2.5), "yaw": (70.0, 4.0)}
-    motion = {"ramp": 2.0} | {name: {"amplitude": a, "period": p} for name, (a, p) in angles.items()}
-    q = Rotation.from_rotvec([0.4, -0.7, 1.1])
-    t = np.arange(0.0, 2.0001, 0.005)
-    law = EndMotion(Motion(**motion), [0, 0, 0], np.eye(3))
-    vectors = q.apply([Rotation.from_matrix(law.at_time(x)[2]).as_rotvec(degrees=True) for x in t])
-    np.savetxt(tmp_path / "r.csv", np.column_stack([t, vectors]), delimiter=",", header="t,rx,ry,rz", comments="")
-    assert np.abs(np.diff(vectors, axis=0)).max() < 10.0, "beyond half a turn the vector would jump"
-
-    def found(turn, moved):
-        first = {"position": [0, 0, 0], "tangent": turn.apply(X).tolist(), "normal": turn.apply(Z).tolist()}
-        ends = {"start": {"kind": "clamped", **first, "motion": moved}, "end": "free"}
-        straight = {"kind": "straight", "direction": turn.apply(X).tolist()}
-        section = SECTION | {"length": 2.0, "axial_stiffness": None, "bending_stiffness": [8.0, 3.0]}
-        time = {"duration": 1.5, "step": 0.005}
-        mesh = {"cells": 20}
-        return hybrid.run(taut(cable={"sections": [section]}, ends=ends, initial=straight, time=time, mesh=mesh))
-
-    one, other = found(Rotation.identity(), motion), found(q, {"file": str(tmp_path / "r.csv")})
-    turned = q.apply(np.array(one.position[-1]))
-    assert np.abs(one.position[-1] - one.position[0]).max() > 0.3
-    # the spline through samples 0.005 s apart: some 1e-6 of the angle
-    np.testing.assert_allclose(other.position[-1], turned, atol=2e-5)
-    scale = np.abs(one["torque"][-1]).max()
-    np.testing.assert_allclose(other["torque"][-1], one["torque"][-1], atol=1e-3 * scale)
-
-
 FOLLOWS = {"kind": "adaptive", "curvature_error": 0.1}
 
 
@@ -281,23 +240,6 @@ def turning(turns: float, folder: Path, swivel: bool = True, model: Any = "rod")
     return hybrid.run(scene)
 
 
-def test_a_line_in_a_plane_hangs_with_a_swivel_as_without() -> None:
-    with_one, without = (hybrid.static(line(x)) for x in (True, False))
-    np.testing.assert_allclose(with_one.position, without.position, atol=1e-9 * LENGTH_SWIVEL)
-    np.testing.assert_allclose(with_one.bending_moment, without.bending_moment, atol=1e-8)
-
-
-def test_clamps_turned_against_each_other_twist_a_line_without_a_swivel_only() -> None:
-    """A quarter turn between the normals of both clamps."""
-    with_one, without = (hybrid.static(line(x, (1.0, 0.0, -1.0))) for x in (True, False))
-    assert np.abs(with_one.torque).max() < 1e-9
-    np.testing.assert_allclose(
-        np.abs(without.torque), GJ_SWIVEL * 0.5 * np.pi / LENGTH_SWIVEL, rtol=0.02
-    )  # its bend takes a part
-    level = hybrid.static(line(True))
-    np.testing.assert_allclose(with_one.position, level.position, atol=1e-9 * LENGTH_SWIVEL)
-
-
 @pytest.mark.parametrize("model", MODELS)
 def test_turns_of_a_clamp_pass_a_swivel(model: str, tmp_path: Path) -> None:
     """Ten turns of a clamp about its tangent change nothing in the end; without a swivel the line holds them."""
@@ -307,11 +249,6 @@ def test_turns_of_a_clamp_pass_a_swivel(model: str, tmp_path: Path) -> None:
     assert moved < (1e-3 if model == "adaptive" else 1e-4) * LENGTH_SWIVEL  # zones that move are where they were of use
     assert "turns/link" not in turned.names
     assert not {"unresolved twist", "steps cut", "loop can form"} & kinds(turned)
-
-
-def test_without_a_swivel_turns_of_a_clamp_are_held(tmp_path: Path) -> None:
-    held = turning(1.0, tmp_path, swivel=False)
-    np.testing.assert_allclose(np.abs(held.torque[-1]), GJ_SWIVEL * 2.0 * np.pi / LENGTH_SWIVEL, rtol=0.02)
 
 
 def test_both_sides_of_a_swivel_bear_no_torque_at_it(tmp_path: Path) -> None:

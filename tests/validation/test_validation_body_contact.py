@@ -13,10 +13,10 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.junctions.bodies import PLACE, V, W
+from hybrid.kernels.junctions.bodies import PLACE, W
 from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_network
-from hybrid.scene.bodies import FreeBody, turned
+from hybrid.scene.bodies import turned
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene
 from hybrid.simulation.equilibrium import joined_lines
@@ -24,7 +24,6 @@ from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
 from tests.combinations.pairs import seen_by
 from tests.scenes import line_between, network_scene
-from tests.validation.thrown_lines import straight, throw
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
 Tables = dict[str, Any]
@@ -355,26 +354,7 @@ def test_a_line_ignores_the_body_that_it_is_fixed_to_until_it_has_left_it() -> N
         assert not shaped.lines["leg"]["obstacles/buoy/force"].any()
 
 
-# --- free flight ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.5])
-def test_a_thrown_line_gives_a_ball_what_it_loses(friction: float) -> None:
-    """Momentum to 1e-6 of what the line brings, and energy never above 1.001 of what there was.
-
-    Angular momentum is kept as well as steps keep that of a free line.
-    """
-    body = FreeBody(
-        initial_guess=(1.2, 0.3, 0.0), initial_rotation=(10, 20, 30), mass=2.0, inertia=(0.1, 0.2, 0.25),
-        centre=(0.05, 0.02, -0.03), shape={"kind": "sphere", "radius": 0.3, "friction": friction, "stiffness": 1e4},
-    )  # fmt: skip
-    line = straight(3.0, np.array([1.5, 0.0, 0.35]), np.array([1.0, 0.0, 0.0]), 60)
-    found = throw([line], [np.tile([0.5, 0.0, -4.0], (61, 1))], 0.001, 0.25, body=body)
-    brought, energies = 3.0 * 0.4 * 4.0, found.energies
-    assert np.linalg.norm(found.states.bodies[0, V : V + 3]) > 0.1
-    assert np.abs(np.diff(found.momentum, axis=0)).max() < 1e-6 * brought
-    assert np.abs(np.diff(found.turning, axis=0)).max() < 1e-3 * brought
-    assert min(energies) / energies[0] > 0.8 and max(energies) < 1.001 * energies[0]
+# --- Newton's method --------------------------------------------------------------------------------
 
 
 def test_newtons_method_converges_quadratically() -> None:

@@ -5,7 +5,6 @@ Heavy bodies against obstacles, momentum of what flies freely, rest, equivalence
 
 from __future__ import annotations
 
-from copy import deepcopy
 from itertools import pairwise
 from typing import Any
 
@@ -68,28 +67,6 @@ def test_a_ball_presses_lines_on_each_other(fallen: Any) -> None:
 
 def test_a_turned_scene_moves_the_same(fallen: Any) -> None:
     turns_with_its_scene(crossed(), fallen, 1e-7)
-
-
-def test_a_very_heavy_body_is_an_obstacle() -> None:
-    """Lines are lifted against it and each other."""
-    tables = crossed(stiffness=1e5)
-    tables["environment"] = {"gravity": 0}
-    heavy = {"initial_guess": [4.2, 0.02, 0.63], "mass": 1e12, "inertia": [1e12, 1e12, 1e12],
-             "shape": tables["bodies"]["ball"]["shape"]}  # fmt: skip
-    tables["bodies"] = {"ball": heavy}
-    for side in ("left", "right"):
-        for end in (0, 10):
-            up = 0.06 if side == "right" else 0.05
-            tables["points"][f"{end}{side}"]["motion"] = {"travel": {"by": [0, 0, up], "over": 0.3}}
-    other = deepcopy(tables)
-    del other["bodies"]
-    other["obstacles"] = {"ball": heavy["shape"] | {"at": heavy["initial_guess"]}}
-    by_body, by_obstacle = hybrid.run(tables), hybrid.run(other)
-    for side in ("left", "right"):
-        a, b = by_body.lines[side], by_obstacle.lines[side]
-        assert a["self_contact"].max() > 1.0 and np.abs(a["obstacles/ball/force"]).max() > 1.0
-        np.testing.assert_allclose(a.position, b.position, atol=1e-6)
-        np.testing.assert_allclose(a["self_contact"], b["self_contact"], atol=1e-3 * b["self_contact"].max())
 
 
 def test_legs_of_a_line_cross_below_the_body_that_it_hangs_over() -> None:
