@@ -40,7 +40,6 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
-from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState, NetworkTaken
@@ -133,12 +132,13 @@ class StepsOfLine:
         """line: in place of that of the model."""
         self.model, line = model, model.line if line is None else line
         sea, ends = model.sea.at_time(0.0), model.ends.at_time(0.0)  # arrays that `at_time` overwrites
-        self.solver = LineSolver(JoinedLine(line, sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1)))
+        x = JoinedLine(line, sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1))
+        self.solver = NetworkSolver([x], 0, apart=True)
 
     def begin(self, state: State, accelerations: Floats = STILL) -> NetworkTaken:
         """Give a state at t = 0 its accelerations and tensions; those of held ends: (2, 3) m/s2."""
         self._stand_at(0.0)
-        return NetworkSolver(self.solver.lines, 0).consistent_accelerations(NetworkState([state]), [accelerations])
+        return self.solver.consistent_accelerations(NetworkState([state]), [accelerations])
 
     def step(
         self, t: float, old: State, new: State, dt: float, rho: float, before: float, rho_before: float | None = None

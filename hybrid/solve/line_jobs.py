@@ -58,26 +58,26 @@ class LineJobs:
 
     def __init__(
         self, lines: Sequence[JoinedLine], bodies: Floats, contacts: Sequence[SelfContact | None],
-        shared: SharedContact | None,
+        shared: SharedContact | None, apart: bool,
     ) -> None:  # fmt: skip
         """As of `NetworkSolver`."""
-        self.lines, self.bodies = tuple(lines), bodies
+        self.lines, self.bodies, self.apart = tuple(lines), bodies, apart
         self._nodes = sum(x.line.s.size for x in lines)
         self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
         self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
         self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
         self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
-        self._rides = lines[0].rides  # obstacles are those of all lines
+        self._rides = lines[0].rides[: 0 if apart else None]  # obstacles are those of all lines
         reaches = [bool(x.line.bits & OBSTACLES) for x in lines]
         turning = int((lines[0].line.moved == FREE).sum())
-        self._sheaves = turning if any(reaches) else 0
+        self._sheaves = turning if any(reaches) and not apart else 0
         free = bool(self._rides.size or turning)
         # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.  Of
         # each whether it always moves with others, or never, or else how near it is to what is free, which it may move.
-        apart = [APART if reach or not free else APART_ALWAYS for reach in reaches]
+        lone = [APART if (reach and not apart) or not free else APART_ALWAYS for reach in reaches]
         joined = [max(x.joints) >= 0 for x in lines]
-        self._near = np.where(joined, JOINED, apart)
+        self._near = np.where(joined, JOINED, lone)
         together = [k for k in self._touching_lines if k not in self._contacts or lines[k].keeps_pace]
         self._near[together] = JOINED
         self._alone = np.zeros(len(lines), np.int64)

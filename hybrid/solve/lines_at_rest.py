@@ -1,6 +1,6 @@
 """Equilibria of lines, of one or of several that meet, are sought without friction and with it.
 
-A line that is joined to nothing that moves is a group of one: it is solved by itself (solve.line_solver), and sought in
+A line that is joined to nothing that moves is a group of one: it is solved by itself, and sought in
 its plane first where it lies in one.  Ways and their order are those of solve.search.
 """
 
@@ -13,10 +13,9 @@ from itertools import chain, islice
 from typing import NamedTuple
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state.report import FRICTION, PLANAR, SELF_CONTACT, WAVES
+from hybrid.kernels.state.report import FREE, FRICTION, PLANAR, SELF_CONTACT, WAVES
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import leaves_plane, planar, untwist
-from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NO_BODIES, NetworkSolver
 from hybrid.solve.search import PULLED, PUSHED, Attempt, Start, Tally, attempts, first_sound, pulled, stuck, summary_of
 from hybrid.solve.stability import is_stable
@@ -96,7 +95,7 @@ class Group(NamedTuple):
         x, more = self.lines[0], len(self.lines) > 1 or self.points or len(self.bodies)
         return not more and max(x.joints) < 0 and not x.line.bits & SELF_CONTACT
 
-    def solver(self, rough: Iterable[int] = (), slackens: bool = True) -> LineSolver | NetworkSolver:
+    def solver(self, rough: Iterable[int] = (), slackens: bool = True) -> NetworkSolver:
         """Of the lines without waves, and all but those of the numbers `rough` without friction.
 
         slackens: whether a slack solution will do where a line asks for that; with friction it is not taken.
@@ -106,7 +105,7 @@ class Group(NamedTuple):
             bits = x.line.bits & ~(WAVES | (0 if k in rough else FRICTION))
             slack = x.slackens and slackens and not rough
             lines.append(x._replace(line=x.line._replace(bits=bits), slackens=slack))
-        return LineSolver(lines[0]) if self.is_alone else NetworkSolver(lines, self.points, self.bodies.copy())
+        return NetworkSolver(lines, self.points, self.bodies.copy(), apart=self.is_alone)
 
     def begun(self, start: NetworkState) -> NetworkState:
         """Untwist the start of a planar line: in its plane nothing would turn back a twist."""
@@ -206,14 +205,8 @@ def _in_plane_first(
 def _solution(path: tuple[str, ...], tried: Attempt, tally: Tally) -> LinesAtRest:
     solver, states = tried.solver, tried.states
     rough = frozenset(k for k, x in enumerate(solver.lines) if x.line.bits & FRICTION)
-    residual = solver.proof(states)
-
-    def made() -> NetworkSolver:
-        several = NetworkSolver(solver.lines, 0)
-        several.evaluate_forces(states, several.anchor)
-        return several
-
-    return LinesAtRest(
-        states, path, tally.total, residual, solver if isinstance(solver, NetworkSolver) else made,
-        with_friction=rough, blurred=frozenset(solver.blurred),
-    )  # fmt: skip
+    residual, blurred = solver.proof(states), frozenset(solver.blurred)
+    if solver.apart and (solver.lines[0].line.moved == FREE).any():  # sheaves that turn, which it did not know of
+        solver = NetworkSolver(solver.lines, 0)
+        solver.evaluate_forces(states, solver.anchor)
+    return LinesAtRest(states, path, tally.total, residual, solver, with_friction=rough, blurred=blurred)

@@ -1,6 +1,7 @@
 """Lines that meet at points: their equilibrium, their consistent accelerations, and their steps in time.
 
-One Newton for all of them (kernels.run.network).  States go in and come out as of a single line (solve.stepper); a free
+One Newton for all of them (kernels.run.network), or where nothing joins or may join them one after the other, in space
+or in its plane (kernels.run.entry).  States go in and come out as of a single line (solve.stepper); a free
 point has none of its own, it is the last or first node of every line that is joined to it.  A body has a row of numbers
 (kernels.junctions.bodies).
 """
@@ -20,12 +21,13 @@ from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PL
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.run.entry import workspace_of
+from hybrid.kernels.run.entry import ONE_MARCH, workspace_of
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_network_step, solve_network
 from hybrid.kernels.state.report import (
     FRICTION,
     LOCAL_ERROR,
     NET_A,
+    OBSTACLES,
     PLANAR,
     RESIDUAL,
     SEABED_ENERGY,
@@ -40,11 +42,18 @@ from hybrid.kernels.step.step_law import REFUSED
 from hybrid.solve.contact import SelfContact, SharedContact, left_over
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.line_jobs import LineJobs
-from hybrid.solve.line_solver import BALANCED, BALANCING, CLOSER, MOST_ITERATIONS
-from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING
-from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, lie_on_bed
+from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING, DAMPING, stop
+from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, Solution, lie_on_bed
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 
+MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
+MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
+# An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
+BALANCED, BALANCING = 1e-6, 4
+# Where lines touch Newton goes on once unless this many times the residual balances, too: a ball on lines that lie on
+# others was 3e-7 m away from where it rests, and lines on one that is held bore 1e-5 more than its weight.
+CLOSER = 100.0
+DRIFTED = 10.0  # lengths that a line has gone from its start where it has drifted
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
 NEUTRAL = 1e-6
 # Of the longest line: arm by which moments on bodies are compared with forces, at least.
@@ -55,23 +64,22 @@ NO_BODIES: Floats = np.zeros((0, NUMBERS))
 class NetworkSolver(LineJobs):
     """Solves for all lines of a network at once; owns the work arrays, not the states.
 
-    It works in space, but for steps of lines that are joined to nothing and are marked as planar.
+    It works in space, but for lines that are joined to nothing and are marked as planar.
     """
-
-    settling = CONTACT_DAMPING
 
     def __init__(
         self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
         contacts: Sequence[SelfContact | None] = (), shared: SharedContact | None = None, tolerance: float = TOLERANCE,
+        apart: bool = False,
     ) -> None:  # fmt: skip
         """Make tables of lines; each point and body must be at an end of some line.
 
         points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
         lines that touch themselves, in the order of the lines, None: of one that does not; empty: none does.  shared:
         contact of lines that may touch each other, which have none of their own; tolerance: of Newton's method in
-        steps.
+        steps; apart: whether lines that are joined to nothing are solved by themselves whatever is free beside them.
         """
-        super().__init__(lines, bodies, contacts, shared)
+        super().__init__(lines, bodies, contacts, shared, apart)
         self.tolerance, self.net, self.body_work = tolerance, np.zeros((points, 3)), np.zeros((len(bodies), WORK))
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
@@ -81,6 +89,34 @@ class NetworkSolver(LineJobs):
         self._make_tables()
 
     def _solve(self, task: Task, old: NetworkState, new: NetworkState, t: float = 0.0) -> NetworkTaken:
+        """Do a task (kernels.step.newton) from `old` to `new`, which is overwritten; t: s, of `new`.
+
+        Lines that nothing joins or may join are solved one after the other, with the limits of each.
+        """
+        if not self._marches_alone:
+            return self._solve_joined(task, old, new, t)
+        self.turns, worst = None, NetworkTaken(Outcome.OK, 0, -np.inf, -1, -1, np.inf)
+        for k, table in self._lone_tables.items():
+            x, work = self.lines[k], self.work[k]
+            if task.what in (ASSEMBLY, CORRECTION):
+                work.torsion.known[:1] = -1.0  # how it answers to torques is found anew
+            own = task._replace(limits=task.limits._replace(reach=REACH * x.length, scale=x.scale))
+            table.bind(task=own, **self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
+            outcome, iterations, left, where = self._kernel_of(k)(table.numbers)
+            table.bind(task=self._task_of_run(k))
+            if task.what == ASSEMBLY and outcome == Outcome.SINGULAR and work.report[RESIDUAL] < np.inf:
+                outcome = Outcome.OK  # forces of a line alone are known whatever its equations are
+            most = max(iterations, worst.iterations)
+            if outcome != Outcome.OK or not left <= worst.correction:
+                worst = NetworkTaken(Outcome(outcome), most, left, k, where, np.inf)
+            if outcome != Outcome.OK:
+                break
+        if task.what == ASSEMBLY and worst.outcome == Outcome.OK:
+            self._begin_books(new, t)
+        return replace(worst, residual=self.residual())
+
+    def _solve_joined(self, task: Task, old: NetworkState, new: NetworkState, t: float = 0.0) -> NetworkTaken:
+        """The same with all lines at once, in space."""
         self.turns = None
         self._bind_states(0, old, new)
         for k, contact in self._contacts.items():
@@ -94,26 +130,6 @@ class NetworkSolver(LineJobs):
         self._let_march()
         outcome, iterations, left, line, where = solve_network(self._all.jobs[0].numbers)
         return NetworkTaken(Outcome(outcome), iterations, left, line, where, self.residual())
-
-    def _march(self, what: int, ca: float, states: NetworkState, t: float = 0.0) -> NetworkTaken:
-        """Forces (ASSEMBLY) or a CORRECTION of states, of lines by themselves by the kernels of their steps."""
-        task = Task(what, ca=ca, limits=Limits(1.0, 1.0, 1))
-        if not self._marches_alone:
-            return self._solve(task, states, states, t)
-        self.turns = None
-        for k, table in self._lone_tables.items():
-            work, state = self.work[k], states.lines[k]
-            work.torsion.known[:1] = -1.0  # how it answers to torques is found anew
-            table.bind(task=task, old=state, new=state)
-            outcome, iterations, left, where = self._kernel_of(k)(table.numbers)
-            table.bind(task=self._task_of_run(k))
-            # forces of a line alone are known whatever its equations are
-            known = what == ASSEMBLY and outcome == Outcome.SINGULAR and work.report[RESIDUAL] < np.inf
-            if outcome != Outcome.OK and not known:
-                return NetworkTaken(Outcome(outcome), iterations, left, k, where, self.residual())
-        if what == ASSEMBLY:
-            self._begin_books(states, t)
-        return NetworkTaken(Outcome.OK, 1, np.inf, -1, -1, self.residual())
 
     def _begin_books(self, states: NetworkState, t: float) -> None:
         """Powers and extremes of lines that are solved by themselves, in states whose reports are known, at t (s)."""
@@ -167,7 +183,7 @@ class NetworkSolver(LineJobs):
         """
         self.evaluate_forces(states, 0.0)
         if cv:
-            self._solve(Task(ASSEMBLY, cv=cv, limits=Limits(1.0, 1.0, 1)), states, states)
+            self._solve_joined(Task(ASSEMBLY, cv=cv, limits=ONE_MARCH), states, states)
         rows = self._pressed["touched"][: self._pressed["found"][0]]
         own, wrench = (self._pressed[x].copy() for x in ("own", "wrench"))
         return rows.copy(), own, wrench, self._pressed["carriers"]
@@ -246,14 +262,14 @@ class NetworkSolver(LineJobs):
         before, rho_before: the length, s, of the step that led to `old`, 0 if it is a start, and its spectral radius,
         `NetworkTaken.rho` of it.  t: s, of `new`, for extremes.
         """
-        limits = Limits(REACH * self.length, 1.0, most, self.tolerance)
+        limits = Limits(REACH * self.length, self.scale, most, self.tolerance)
         task = Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before)
         taken = self._solve(task, old, new, t)
         if taken.outcome != Outcome.OK:
             return taken
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
         used, ratio = float(self.work[0].report[USED_RHO]), float((errors / self.allowed).max())
-        if not ratio > REFUSED:
+        if not ratio > REFUSED and not self._marches_alone:  # whose books their run keeps
             book_network_step(self._all.jobs[0].numbers)
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
@@ -295,7 +311,7 @@ class NetworkSolver(LineJobs):
         self._at_rest[0] = 1
         for k in self._touching_lines:
             self.books[k].clock.now = t
-        taken = self._march(CORRECTION, HEAVY, states)
+        taken = self._solve(Task(CORRECTION, ca=HEAVY, limits=ONE_MARCH), states, states)
         self._at_rest[0] = 0
         for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
             self.bind_line(k, work=work, ends=x.ends)
@@ -344,7 +360,7 @@ class NetworkSolver(LineJobs):
             self._around(x, state, work)
             if state.soil.size:
                 lie_in_soil(x.line, x.sea, state.r, state.soil)
-        taken = self._march(ASSEMBLY, ca, states, t)
+        taken = self._solve(Task(ASSEMBLY, ca=ca, limits=ONE_MARCH), states, states, t)
         if taken.outcome == Outcome.OK:
             self._count_contact_energy(states)
         return taken
@@ -387,7 +403,7 @@ class NetworkSolver(LineJobs):
         factors of its lines.  Friction is left out.  ca: 1/s2, of springs of that times the mass.
         """
         self._stand(states)
-        taken = self._solve(Task(JUNCTIONS, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
+        taken = self._solve_joined(Task(JUNCTIONS, ca=ca, limits=ONE_MARCH), states, states)
         m = self._matrix.shape[1] - 1
         if taken.outcome != Outcome.OK:
             return None
@@ -409,11 +425,11 @@ class NetworkSolver(LineJobs):
         The springs that hold what nothing else does are a part of NEUTRAL of what a force of the tension scale does
         over the length.  Whether lines themselves would buckle is not asked.
         """
+        if not (len(self.net) or len(self.bodies)):
+            return True
         C = self.compliance(states, NEUTRAL / ANCHOR * self.anchor)
         if C is None:
             return False
-        if C.size == 0:
-            return True
         arm = np.ones(C.shape[0])
         turns = 3 * len(self.net) + 6 * np.arange(len(self.bodies))[:, None] + np.arange(3, 6)
         arm[turns.ravel()] = max(float(np.abs(self._fairleads).max()), 1e-3 * self.length)  # m, so that all are lengths
@@ -428,11 +444,76 @@ class NetworkSolver(LineJobs):
         """
         self._gaps[:] = 0.0
         self._stand(states)
-        taken = self._solve(Task(CORRECTION, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
+        taken = self._solve_joined(Task(CORRECTION, ca=ca, limits=ONE_MARCH), states, states)
         return taken.outcome == Outcome.OK
 
-    def newton_round(self, states: NetworkState) -> NetworkTaken:
-        """Static Newton from states at rest, which it overwrites.
+    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> NetworkSolver:
+        """The same of other lines that are joined likewise, without contact; bodies: None: of the same ones."""
+        return NetworkSolver(lines, len(self.net), self.bodies if bodies is None else bodies, apart=self.apart)
+
+    @property
+    def settling(self) -> float:
+        """Of a motion to rest, as of solve.stability.damped."""
+        return DAMPING if self._marches_alone else CONTACT_DAMPING
+
+    def turned(self, start: NetworkState) -> Solution | None:
+        """As `newton`, with chords that are turned; None: they are of lines by themselves alone."""
+        return self.newton(start, turning=True) if self._marches_alone else None
+
+    def newton(self, start: NetworkState, turning: bool = False) -> Solution:
+        """Static Newton from `start`; a new state is returned, the old one is left as it was.
+
+        An outcome other than OK also where what was found is no equilibrium (`flaw`), or has gone with what only the
+        springs of the anchor hold.
+        """
+        taken, new = self._balance(start, turning)
+        if taken.outcome == Outcome.OK:
+            outcome, line, where = self.flaw(new)
+            if self.is_apart and outcome != Outcome.SLACK:
+                each = zip(start.lines, new.lines, self.lines, strict=True)
+                for k, (a, b, x) in enumerate(each):
+                    far = np.abs(b.r - a.r).max(axis=1)
+                    if far.max() > DRIFTED * x.length:
+                        outcome, line, where = Outcome.SINGULAR, k, int(np.argmax(far))
+            taken = replace(taken, outcome=outcome, line=line, where=where)
+        return taken, new
+
+    def balance(self, start: NetworkState) -> Solution:
+        """As `newton`, whatever the state in which forces balance; of lines by themselves as far as Newton says so."""
+        return self._balance(start, proves=not self._marches_alone)
+
+    def _balance(self, start: NetworkState, turning: bool = False, proves: bool = True) -> Solution:
+        """Rounds of Newton until forces are seen to balance; proves: whether they are looked at."""
+        new = start.copy()
+        for state in new.lines:
+            stop(state)
+            state.sheave[:] = 0.0
+        new.bodies[:, V:] = 0.0
+        taken = NetworkTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
+        iterations, kept, rubs = 0, None, any(x.line.bits & FRICTION for x in self.lines)
+        lies = self._marches_alone and any(x.line.bits & OBSTACLES for x in self.lines)
+        for _ in range(BALANCING):
+            taken = self.newton_round(new, turning)
+            iterations += taken.iterations
+            taken = replace(taken, iterations=iterations)
+            if taken.outcome != Outcome.OK or not proves:
+                break
+            # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
+            proof = self.proof(new)
+            taken, touches = replace(taken, residual=proof), lies or self.in_contact()
+            if not self.is_balanced(new, proof):
+                taken = replace(taken, outcome=Outcome.NOT_CONVERGED)
+            elif kept is not None or (not rubs and (not touches or self.is_balanced(new, CLOSER * proof))):
+                break
+            else:  # contact, and friction that sticks, are stiff: one more round, of which nothing is lost
+                kept = taken, new.copy()
+        if kept is not None and taken.outcome != Outcome.OK:
+            taken, new = kept
+            self.proof(new)
+        return taken, new
+
+    def newton_round(self, states: NetworkState, turning: bool = False) -> NetworkTaken:
+        """Static Newton from states at rest, which it overwrites; turning: whether chords are turned.
 
         Springs of `anchor` times their mass hold nodes and bodies where they are: what is found balances with these.
         """
@@ -443,8 +524,8 @@ class NetworkSolver(LineJobs):
             contact.forget()
         if self.shared is not None:
             self.shared.forget()
-        task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(REACH * self.length, 1.0, MOST_ITERATIONS))
-        taken = self._solve(task, states, states)
+        limits = Limits(REACH * self.length, self.scale, MOST_TURNING if turning else MOST_ITERATIONS)
+        taken = self._solve(Task(EQUILIBRIUM, ca=self.anchor, turning=turning, limits=limits), states, states)
         states.bodies[:, PLACE:FRAME] += self.body_work[:, U : U + 3]
         states.bodies[:, V:] = 0.0
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
@@ -454,52 +535,6 @@ class NetworkSolver(LineJobs):
                 state.slip[:] = x.sea.slid
             rest_in_soil(x.line, x.sea, state.r, state.soil)
         return taken
-
-    def others(self, lines: Sequence[JoinedLine], bodies: Floats | None = None) -> NetworkSolver:
-        """The same of other lines that are joined likewise, without contact; bodies: None: of the same ones."""
-        return NetworkSolver(lines, len(self.net), self.bodies if bodies is None else bodies)
-
-    def turned(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState] | None:
-        """None: chords are not turned, as those of a line by itself are."""
-        return None
-
-    def newton(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState]:
-        """Static Newton from `start`; a new state is returned, the old one is left as it was.
-
-        An outcome other than OK also where what was found is no equilibrium (`flaw`).
-        """
-        taken, new = self.balance(start)
-        if taken.outcome == Outcome.OK:
-            outcome, line, where = self.flaw(new)
-            taken = replace(taken, outcome=outcome, line=line, where=where)
-        return taken, new
-
-    def balance(self, start: NetworkState) -> tuple[NetworkTaken, NetworkState]:
-        """As `newton`, whatever the state is in which all forces balance."""
-        new = start.copy()
-        for state in new.lines:
-            for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd, state.sheave):
-                still[:] = 0.0
-        new.bodies[:, V:] = 0.0
-        taken = NetworkTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
-        iterations, kept, rubs = 0, None, any(x.line.bits & FRICTION for x in self.lines)
-        for _ in range(BALANCING):
-            taken = self.newton_round(new)
-            iterations += taken.iterations
-            if taken.outcome != Outcome.OK:
-                break
-            proof = self.proof(new)
-            taken = NetworkTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
-            if not self.is_balanced(new, proof):
-                taken = replace(taken, outcome=Outcome.NOT_CONVERGED)
-            elif kept is not None or (not rubs and (not self.in_contact() or self.is_balanced(new, CLOSER * proof))):
-                break
-            else:  # contact, and friction that sticks, are stiff: one more round, of which nothing is lost
-                kept = taken, new.copy()
-        if kept is not None and taken.outcome != Outcome.OK:
-            taken, new = kept
-            self.proof(new)
-        return taken, new
 
     def is_balanced(self, states: NetworkState, residual: float) -> bool:
         """Whether a largest residual force (N) is round-off of the forces in states."""

@@ -1,7 +1,6 @@
 """Ways to equilibria of lines, of one or of several that meet: Newton from the shapes given, then slow roads.
 
-One search for all; what solves differs: a line that nothing moves (solve.line_solver), or several that meet
-(solve.network_solver).
+One search for all lines (solve.network_solver).
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ from hybrid.kernels.state.report import (
 from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
 from hybrid.solve.flaws import at_rest, fold_text, lowest_tension, on_obstacles, slack_text
-from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import (
     CALM,
@@ -68,7 +66,6 @@ LIMP = 1e-3  # part of the bending stiffness with which a continuation begins
 # What a balanced state may be and yet no equilibrium; the first is what a search that found none tells.
 FLAWS = (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED)
 
-Solver = LineSolver | NetworkSolver  # of one line that nothing moves, or of several that meet
 Start = tuple[str, NetworkState]
 
 
@@ -96,7 +93,7 @@ class Attempt(NamedTuple):
     how: str
     taken: NetworkTaken
     states: NetworkState
-    solver: Solver
+    solver: NetworkSolver
     real: bool = True
 
 
@@ -158,7 +155,9 @@ def _failed(worst: Attempt, path: Sequence[str]) -> LineFailed:
 # --- with friction --------------------------------------------------------------------------------------
 
 
-def stuck(rough: Solver, lines: Iterable[int], first: NetworkState, shape: str, tally: Tally) -> Iterator[Attempt]:
+def stuck(
+    rough: NetworkSolver, lines: Iterable[int], first: NetworkState, shape: str, tally: Tally
+) -> Iterator[Attempt]:
     """Where friction alone keeps these lines: they settle from their start, with friction, then Newton from there."""
     out = first.copy()
     for k in lines:
@@ -169,7 +168,7 @@ def stuck(rough: Solver, lines: Iterable[int], first: NetworkState, shape: str, 
 
 
 def pulled(
-    smooth: Solver, rough: Solver, lines: Sequence[int], states: NetworkState, tally: Tally
+    smooth: NetworkSolver, rough: NetworkSolver, lines: Sequence[int], states: NetworkState, tally: Tally
 ) -> Iterator[Attempt]:
     """These lines laid where they touch, without tension, along an equilibrium without friction, then pulled tight.
 
@@ -193,7 +192,7 @@ def pulled(
         yield Attempt(f"{how}, while the current grows", *tally.counted(rough.newton(rest)), rough)
 
 
-def _in_still_water(smooth: Solver, states: NetworkState, tally: Tally) -> NetworkState | None:
+def _in_still_water(smooth: NetworkSolver, states: NetworkState, tally: Tally) -> NetworkState | None:
     """The equilibrium beside one in a current that there is without it.
 
     None: no current acts on lines, or there is none, as of one that floats.
@@ -206,7 +205,7 @@ def _in_still_water(smooth: Solver, states: NetworkState, tally: Tally) -> Netwo
 
 
 def in_slower_currents(
-    smooth: Solver, states: NetworkState, parts: Sequence[float], tally: Tally
+    smooth: NetworkSolver, states: NetworkState, parts: Sequence[float], tally: Tally
 ) -> list[NetworkState] | None:
     """Equilibria that lead from one in a current to those in these parts of it, one from the other.
 
@@ -222,7 +221,7 @@ def in_slower_currents(
     return found[1:]
 
 
-def _in_current(solver: Solver, part: float) -> Solver:
+def _in_current(solver: NetworkSolver, part: float) -> NetworkSolver:
     """The same with this part of the current."""
     return solver.others([x._replace(sea=with_current(x.sea, part)) for x in solver.lines], solver.bodies.copy())
 
@@ -230,7 +229,9 @@ def _in_current(solver: Solver, part: float) -> Solver:
 # --- without friction -----------------------------------------------------------------------------------
 
 
-def attempts(solver: Solver, starts: Iterable[Start], others: Iterable[Start], tally: Tally) -> Iterator[Attempt]:
+def attempts(
+    solver: NetworkSolver, starts: Iterable[Start], others: Iterable[Start], tally: Tally
+) -> Iterator[Attempt]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed.
 
     starts: shapes to begin with, with their names; others: those that come into question where these lead nowhere.
@@ -277,7 +278,7 @@ class _Fall(NamedTuple):
 class _Ways:
     """Ways to an equilibrium of one search, which knows the unstable and folded ones that it has met."""
 
-    def __init__(self, solver: Solver, tally: Tally) -> None:
+    def __init__(self, solver: NetworkSolver, tally: Tally) -> None:
         self.solver, self.tally = solver, tally
         self.first: Outcome | None = None  # of the first attempt
         self._flawed: list[tuple[int, NetworkState]] = []  # the line that is, -1: a point, and the states
@@ -432,7 +433,7 @@ def _harder(x: JoinedLine, goal: float, short: Floats) -> JoinedLine:
     return x._replace(line=line._replace(h=h, ck=ck, bits=line.bits & ~AXIAL_LAW, law_at=NO_ADDRESS))
 
 
-def _taut(solver: Solver, taken: NetworkTaken, states: NetworkState) -> Solution:
+def _taut(solver: NetworkSolver, taken: NetworkTaken, states: NetworkState) -> Solution:
     """What balances, with the outcome SLACK where a catenary is not under tension."""
     for k, (x, state) in enumerate(zip(solver.lines, states.lines, strict=True)):
         tension, cell = lowest_tension(x.line, x.sea, state)
@@ -441,13 +442,15 @@ def _taut(solver: Solver, taken: NetworkTaken, states: NetworkState) -> Solution
     return taken, states
 
 
-def time_scale_of(solver: Solver) -> float:
+def time_scale_of(solver: NetworkSolver) -> float:
     """s, in which the lines and bodies settle."""
     mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
     return float(np.sqrt(mass * solver.length / solver.scale))
 
 
-def relaxed(solver: Solver, start: NetworkState, tally: Tally, longest: float = 0.0) -> tuple[NetworkState, bool]:
+def relaxed(
+    solver: NetworkSolver, start: NetworkState, tally: Tally, longest: float = 0.0
+) -> tuple[NetworkState, bool]:
     """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until lines hardly move; whether they did.
 
     longest: s, of the steps; at least the time scale.  Sheaves are held: without friction nothing turns them.

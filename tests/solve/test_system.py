@@ -17,7 +17,6 @@ from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
 from hybrid.simulation.run import Run, new_run
-from hybrid.solve.line_solver import LineSolver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState, joined_ends
 from tests.scenes import line_between, network_scene
@@ -63,7 +62,8 @@ class Cut:
             self.start.append(model.start)
         self.solver = NetworkSolver(lines, len(cuts))
         whole = JoinedLine(self.line, self.sea, self.ends, LENGTH, self.whole.tension_scale, -np.inf, (-1, -1))
-        self.in_one, self.accelerations = LineSolver(whole), NetworkSolver([whole], 0).consistent_accelerations
+        self.in_one = NetworkSolver([whole], 0)
+        self.accelerations = self.in_one.consistent_accelerations
 
     def apart(self, states: Sequence[Any], name: str, state: Any) -> float:
         """Largest difference of an array of nodes or cells from that of the line in one piece."""
