@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -92,9 +93,10 @@ class LineJobs:
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         self.turns: tuple[NetworkState, NetworkState] | None = None  # states between which steps go back and forth
         self._twists = [bool(x.line.torsion.size) for x in lines]  # whether torques pass through zones of each line
-        self._pressed: dict[str, Any] = {}
+        self._pressed = room_to_meet(self._nodes, self._rides, len(bodies)) if self._rides.size else {}
         self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
         self._marcher = 0  # address of the kernel that marches joined lines; 0: nobody has asked for it
+        self._part: JointJobs | None = None  # jobs of the lines that are solved together, where these are not all
         self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), NetworkTask()
 
     def _make_tables(self) -> None:
@@ -103,8 +105,6 @@ class LineJobs:
         # Of each line two tables, as of the network: states that take turns lead from the one to the other and back.
         self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
         self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in range(len(lines))]
-        self._rooms = self._make_rooms()
-        self._together = self._all = JointJobs(self._rooms, self._numbers, range(len(lines)))
         self.lone: list[int] = []
         self.joined = list(range(len(lines)))
         self.lone_numbers = self._numbers[0, :0]
@@ -129,16 +129,16 @@ class LineJobs:
         """Numbers of the lines that touch themselves, or may touch others."""
         return {*self._contacts, *(self.shared.lines if self.shared is not None else ())}
 
-    def _make_rooms(self) -> Rooms:
-        """What jobs of the lines work in."""
+    @cached_property
+    def _rooms(self) -> Rooms:
+        """What jobs of several lines work in, or of one in a run."""
         lines, points, bodies, nodes = self.lines, len(self.net), self.bodies, self._nodes
         carried = [x.line.h.size + 1 if is_answered_again(x) else 0 for x in lines]
         joints = room_of_joints(lines, carried, points, bodies)
         joints |= {"net": self.net, "work": self.body_work}
-        self._matrix = joints["A"]
         borders: dict[str, Any] = {"joints": {}}
         if self._rides.size:
-            borders["shapes"] = self._pressed = room_to_meet(nodes, self._rides, len(bodies))
+            borders["shapes"] = self._pressed
         if self._winches:
             borders["winches"] = room_to_wind(self._winches, nodes, len(bodies))
         if self._sheaves:
@@ -164,7 +164,7 @@ class LineJobs:
             table.bind(**values)
         if number in self._lone_tables:
             self._lone_tables[number].bind(**self._by_itself(number, values))
-        elif self._together is not self._all:
+        elif self._part is not None:
             for table in self._joined_tables[number]:
                 table.bind(**values)
 
@@ -201,18 +201,28 @@ class LineJobs:
         self._lone_tables = {}
         for k, numbers in zip(self.lone, self.lone_numbers, strict=True):
             table, own = self._tables[k][0].again(numbers), {"line": self.lines[k].line, "work": self.work[k]}
-            table.bind(task=self._task_of_run(k), **self._by_itself(k, own | {"iterated": 0}))
+            table.bind(**self._by_itself(k, own | {"iterated": 0}))
             self._lone_tables[k] = table
-        self._together, self._joined_tables = self._all, dict(enumerate(self._tables))
+        self._part, self._joined_tables = None, dict(enumerate(self._tables))
         if self.lone and not self.is_apart:
             numbers = np.zeros((2, len(self.joined), self._numbers.shape[2]), np.int64)
             self._joined_tables = {
                 k: tuple(mine.again(x[j]) for mine, x in zip(self._tables[k], numbers, strict=True))
                 for j, k in enumerate(self.joined)
             }
-            self._together = JointJobs(self._rooms, numbers, self.joined)
+            self._part = JointJobs(self._rooms, numbers, self.joined)
             if self._marcher:
-                self._together.march_by(self._marcher)
+                self._part.march_by(self._marcher)
+
+    @cached_property
+    def _all(self) -> JointJobs:
+        """Jobs of all lines, made when they are solved together, or a run leads them from state to state."""
+        return JointJobs(self._rooms, self._numbers, range(len(self.lines)))
+
+    @property
+    def _together(self) -> JointJobs:
+        """Jobs of the lines that are solved together."""
+        return self._all if self._part is None else self._part
 
     @property
     def mixes(self) -> bool:
@@ -269,9 +279,6 @@ class LineJobs:
         even, odd = self._tables[number]
         return self._lone_tables[number], even, odd
 
-    def _task_of_run(self, number: int) -> Task:
-        return Task(RUN, limits=self.limits_by_itself(number))
-
     def limits_by_itself(self, number: int) -> Limits:
         """What Newton's method works with in a line that is solved by itself."""
         return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP, self.tolerance)
@@ -309,7 +316,7 @@ class LineJobs:
     @property
     def _groups(self) -> list[JointJobs]:
         """Jobs of all lines, and of those that are solved together where these are others."""
-        return [self._all] if self._together is self._all else [self._all, self._together]
+        return [self._all] if self._part is None else [self._all, self._part]
 
     def _touch(self) -> None:
         """Lines that touch themselves do so from now on, with the books as they are."""
@@ -367,7 +374,7 @@ class LineJobs:
 
     def jobs_of_joined(self) -> tuple[Table, Table]:
         """Jobs of both parities without lines that are solved by themselves: none is left where all are."""
-        if self.joined or self._together is not self._all:
+        if self.joined or self._part is not None:
             return self._together.jobs
         even, odd = (x.again(np.empty_like(x.numbers)) for x in self._together.jobs)
         for x in (even, odd):
@@ -383,7 +390,8 @@ class LineJobs:
         for k, contact in self._contacts.items():
             contact.set_states(old.lines[k], new.lines[k])
         for k, table in self._lone_tables.items():
-            table.bind(**self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
+            states = self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]})
+            table.bind(task=Task(RUN, limits=self.limits_by_itself(k)), **states)
             self._bind_pushes(k)
         numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
         return {
@@ -418,7 +426,7 @@ class LineJobs:
         for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
             tables[parity].bind(old=a, new=b)
         self._all.bind_bodies(parity, old.bodies, new.bodies)
-        if self._together is not self._all:
+        if self._part is not None:
             for k, tables in self._joined_tables.items():
                 tables[parity].bind(old=old.lines[k], new=new.lines[k])
-            self._together.bind_bodies(parity, old.bodies, new.bodies)
+            self._part.bind_bodies(parity, old.bodies, new.bodies)

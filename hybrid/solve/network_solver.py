@@ -95,7 +95,7 @@ class NetworkSolver(LineJobs):
         """
         if not self._marches_alone:
             return self._solve_joined(task, old, new, t)
-        self.turns, worst = None, NetworkTaken(Outcome.OK, 0, -np.inf, -1, -1, np.inf)
+        self.turns, most, residual, worst = None, 0, 0.0, (Outcome.OK, -np.inf, -1, -1)
         for k, table in self._lone_tables.items():
             x, work = self.lines[k], self.work[k]
             if task.what in (ASSEMBLY, CORRECTION):
@@ -103,17 +103,17 @@ class NetworkSolver(LineJobs):
             own = task._replace(limits=task.limits._replace(reach=REACH * x.length, scale=x.scale))
             table.bind(task=own, **self._by_itself(k, {"old": old.lines[k], "new": new.lines[k]}))
             outcome, iterations, left, where = self._kernel_of(k)(table.numbers)
-            table.bind(task=self._task_of_run(k))
-            if task.what == ASSEMBLY and outcome == Outcome.SINGULAR and work.report[RESIDUAL] < np.inf:
+            left_over = float(work.report[RESIDUAL])
+            most, residual = max(most, iterations), max(residual, left_over if left_over < np.inf else np.inf)
+            if task.what == ASSEMBLY and outcome == Outcome.SINGULAR and left_over < np.inf:
                 outcome = Outcome.OK  # forces of a line alone are known whatever its equations are
-            most = max(iterations, worst.iterations)
-            if outcome != Outcome.OK or not left <= worst.correction:
-                worst = NetworkTaken(Outcome(outcome), most, left, k, where, np.inf)
+            if outcome != Outcome.OK or not left <= worst[1]:
+                worst = Outcome(outcome), left, k, where
             if outcome != Outcome.OK:
                 break
-        if task.what == ASSEMBLY and worst.outcome == Outcome.OK:
+        if task.what == ASSEMBLY and worst[0] == Outcome.OK:
             self._begin_books(new, t)
-        return replace(worst, residual=self.residual())
+        return NetworkTaken(worst[0], most, *worst[1:], residual)
 
     def _solve_joined(self, task: Task, old: NetworkState, new: NetworkState, t: float = 0.0) -> NetworkTaken:
         """The same with all lines at once, in space."""
@@ -196,7 +196,8 @@ class NetworkSolver(LineJobs):
 
     def proof(self, states: NetworkState) -> float:
         """Largest force (N) that is left over at a node, a point or a body, with that of contact; reports follow."""
-        residual = self.evaluate_forces(states, self.anchor).residual
+        taken = self.evaluate_forces(states, self.anchor)
+        residual = taken.residual if taken.outcome == Outcome.OK else np.inf
         return self._largest(*self.unbalanced(states, self.anchor)) if self.in_contact() else residual
 
     def unbalanced(self, states: NetworkState, ca: float) -> tuple[list[float], Floats, Floats]:
@@ -267,9 +268,12 @@ class NetworkSolver(LineJobs):
         taken = self._solve(task, old, new, t)
         if taken.outcome != Outcome.OK:
             return taken
+        used = float(self.work[0].report[USED_RHO])
+        if self._marches_alone:  # of which nobody asks for errors and books
+            return replace(taken, rho=used)
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
-        used, ratio = float(self.work[0].report[USED_RHO]), float((errors / self.allowed).max())
-        if not ratio > REFUSED and not self._marches_alone:  # whose books their run keeps
+        ratio = float((errors / self.allowed).max())
+        if not ratio > REFUSED:
             book_network_step(self._all.jobs[0].numbers)
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
@@ -404,12 +408,13 @@ class NetworkSolver(LineJobs):
         """
         self._stand(states)
         taken = self._solve_joined(Task(JUNCTIONS, ca=ca, limits=ONE_MARCH), states, states)
-        m = self._matrix.shape[1] - 1
+        matrix = self._rooms.whole["A"]
+        m = matrix.shape[1] - 1
         if taken.outcome != Outcome.OK:
             return None
         if m == 0:
             return np.zeros((0, 0))
-        A = self._matrix[:m, :m]
+        A = matrix[:m, :m]
         columns = 1.0 / np.maximum(np.abs(A).max(axis=0), 1e-300)
         rows = 1.0 / np.maximum(np.abs(A * columns).max(axis=1), 1e-300)
         try:
