@@ -32,7 +32,7 @@ CRITERIA = "mesh.zone_step.evaluate_criteria"
 ZONE_CHANGES = "mesh.cell_changes.begin_switch", "mesh.cell_changes.end_switch", "mesh.cell_changes.renew"
 STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_contact.contact_task"
 # Steps, equilibria, lines that are joined or touch, those that are paid out.
-OF_JOINED = "run.network.solve_network", "junctions.junctions.join_lines"
+OF_JOINED = "run.newton.solve_network", "junctions.junctions.join_lines"
 STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_network", "run.network_run.sample_network"
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_network_step", "run.network.begin_line"
 TOUCHING_LINES = "junctions.lines_contact.touch_network", "junctions.lines_contact.shared_task"

@@ -18,7 +18,7 @@ from hybrid.kernels.junctions.network_job import APART, APART_ALWAYS, JOINED, Ne
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
-from hybrid.kernels.run.network import solve_network
+from hybrid.kernels.run.newton import solve_network
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for

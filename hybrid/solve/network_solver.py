@@ -1,6 +1,6 @@
 """Lines that meet at points: their equilibrium, their consistent accelerations, and their steps in time.
 
-One Newton for all of them (kernels.run.network), or where nothing joins or may join them one after the other, in space
+One Newton for all of them (kernels.run.newton), or where nothing joins or may join them one after the other, in space
 or in its plane (kernels.run.entry).  States go in and come out as of a single line (solve.stepper); a free
 point has none of its own, it is the last or first node of every line that is joined to it.  A body has a row of numbers
 (kernels.junctions.bodies).
@@ -22,7 +22,8 @@ from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.run.entry import ONE_MARCH, workspace_of
-from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_network_step, solve_network
+from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_network_step
+from hybrid.kernels.run.newton import solve_network
 from hybrid.kernels.state.report import (
     FRICTION,
     LOCAL_ERROR,

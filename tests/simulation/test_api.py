@@ -322,5 +322,5 @@ def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
     taking = KeptCode.taking
     monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
     hybrid.run(KINDS[kind])
-    assert not called & {"run.network.solve_network", "junctions.junctions.join_lines"}
+    assert not called & {"run.newton.solve_network", "junctions.junctions.join_lines"}
     assert ("run.entry.in_space" in called) == kind.startswith("rod in space")

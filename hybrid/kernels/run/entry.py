@@ -19,6 +19,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
+from hybrid.kernels.run.newton import solve
 from hybrid.kernels.state.report import FREE, PLANAR, REMEMBERS, REPORT_SIZE
 from hybrid.kernels.state.state import (
     Ends,
@@ -45,7 +46,6 @@ from hybrid.kernels.step.newton import (
     Task,
     blank_job,
     read,
-    solve,
 )
 from hybrid.kernels.step.step import States
 
@@ -58,7 +58,7 @@ ONE_MARCH = Limits(1.0, 1.0, 1)
 def solve_job(plane, space, job):
     """Do the task of a job for one kind of line (kernels.march.march); of a run, the step that it tries.
 
-    Returns as kernels.step.newton.solve.
+    Returns as kernels.run.newton.solve.
     """
     task, clock, old, new, was, now = job.task, job.books.clock, job.old, job.new, job.was, job.now
     if task.what == RUN:
@@ -96,7 +96,7 @@ _here = _OfThread()
 
 
 def _solve(task: Task, line: Line, sea: Sea, ends: Ends, states: States, work: Work) -> tuple[int, int, float, int]:
-    """As kernels.step.newton.solve, by the kernel for the line's kind."""
+    """As kernels.run.newton.solve, by the kernel for the line's kind."""
     check_turns(line, states.new)
     table, (old, new, was, now) = _here.table, states
     table.bind(task=task, line=line, sea=sea, ends=ends, old=old, new=new, was=was, now=now, work=work)

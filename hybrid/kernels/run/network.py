@@ -1,12 +1,6 @@
-"""Newton's method for lines that meet at points, and samples within its steps.
+"""Steps of lines that meet at points: what Newton's method asks of all of them, their books, and samples within steps.
 
-One nonlinear loop is for all of them, in space.
-
-Every line is marched along s by the kernel of a single line, which is called by its address.  Whatever couples lines is a
-border, points and bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
-Symbols and stopping rule as in kernels.step.newton.
-
-Samples are rows of the lines and bodies at times within a step (kernels.step.sampling).  Ends of lines are where their nodes are, as points are, which have no samples of their own.  Bodies move by the cubic of
+They are solved in space (kernels.run.newton).  Samples are rows of the lines and bodies at times within a step (kernels.step.sampling).  Ends of lines are where their nodes are, as points are, which have no samples of their own.  Bodies move by the cubic of
 their velocities at both ends of the step, and turn by that of their spins; what lines do to them lies on the parabola
 through the step before as well, as reactions do.
 """
@@ -32,33 +26,18 @@ from hybrid.kernels.junctions.bodies import (
     predict_bodies,
     put,
     put_matrix,
-    start_here,
 )
 from hybrid.kernels.junctions.borders import (
-    BALANCE,
     BEFORE_MARCH,
-    BLOCK,
-    CARRY,
-    COUPLE,
     END,
-    FAR,
     FORCE,
-    FORGET,
-    HOLD,
-    MEASURE,
-    NO_NUMBERS,
     PREDICT,
-    RELAX,
-    SAFE_PART,
     SPECTRAL_RADIUS,
     START,
-    STRENGTH,
-    TURNED,
-    UPDATE,
     ask,
 )
 from hybrid.kernels.junctions.junctions import move_joints
-from hybrid.kernels.junctions.network_job import read_network, task_of
+from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import put_matrix as put_matrix_of
@@ -66,7 +45,7 @@ from hybrid.kernels.laws.obstacles import put_vector, stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller
 from hybrid.kernels.march.energies import book_work, find_powers
-from hybrid.kernels.march.march import first_bad, measure, update
+from hybrid.kernels.march.march import first_bad, measure
 from hybrid.kernels.state.books import (
     HEAD,
     RATES,
@@ -76,7 +55,6 @@ from hybrid.kernels.state.report import (
     ENDED,
     LOCAL_ERROR,
     RESIDUAL,
-    RESIDUAL_NODE,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
     SLACKEST,
@@ -87,22 +65,12 @@ from hybrid.kernels.state.report import TURNED as TURNED_AXES
 from hybrid.kernels.step.accept import book_torques, impose_now, keep_past, watch
 from hybrid.kernels.step.newton import (
     ASSEMBLY,
-    CORRECTION,
-    CUT_SHORT,
-    EQUILIBRIUM,
     GAIN,
-    LARGEST_TURN,
-    LOW_TENSION,
-    NOT_CONVERGED,
-    NOT_FINITE,
     OK,
-    OPEN,
     REST,
     SINGULAR,
     SLACK,
-    STEP,
     TURNED_TOO_FAR,
-    WHOLE,
     Task,
     ask_contact,
     begin_line_step,
@@ -110,18 +78,18 @@ from hybrid.kernels.step.newton import (
     call_reel,
     carry,
     end_line_step,
-    has_converged,
     may_gain,
     read,
     round_off_tension,
     rubs,
+    size_of,
     touches,
     wind,
     with_radius,
 )
 from hybrid.kernels.step.sampling import SAME_TIME, frame_between, hermite, parabola, sample_head, sample_state
 from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, find_rates
-from hybrid.kernels.step.step_control import Scheme, scheme
+from hybrid.kernels.step.step_control import scheme
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
@@ -168,14 +136,12 @@ def size_up(tables, ca):
     shift, turn, size, worst, where = 0.0, 0.0, 0.0, 0, -1
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        reach, scale, _, _ = job.task.limits
+        limits, noise = job.task.limits, round_off_tension(job.line, ca, job.task.limits.scale)
         far, turned, cell, change, big = measure(job.new.e, job.new.T, job.work.x)
-        shift = max(shift, far / reach)
+        shift = max(shift, far / limits.reach)
         if not turned <= turn:
             turn, worst, where = turned, l, cell
-        mine = max(turned, WHOLE * far / reach)
-        if not change < round_off_tension(job.line, ca, scale):
-            mine = max(mine, change / max(big, LOW_TENSION * scale))
+        mine = size_of(turned, far, change, big, limits, noise)
         if not mine <= size:
             size = mine
     return shift, turn, size, worst, where
@@ -387,124 +353,6 @@ def first_not_finite(tables):
         if not total < math.inf:
             return l, first_bad(job.work.x, job.new.e)
     return -1, -1
-
-
-@inner
-def find_corrections(network, task, s, it):
-    """Corrections of iteration `it` of all lines and borders, in space.
-
-    Returns OPEN, or the outcome with which the solution ends here, with line and cell or node where it fails.
-    """
-    tables = network.tables
-    line, where = march_lines(network, task.what == STEP)
-    if line >= 0:
-        report = read(tables[line]).work.report
-        if not report[RESIDUAL] < math.inf:
-            return NOT_FINITE, line, int(report[RESIDUAL_NODE])
-        return SINGULAR, line, where
-    ask(network, BALANCE)
-    if task.what == ASSEMBLY:
-        carry_lines(tables, s, task.what)  # rates of twist are known now
-        return OK, -1, -1
-    ask(network, BLOCK)
-    if task.what == JUNCTIONS:
-        return OK, -1, -1
-    if task.what == EQUILIBRIUM and it == 1:
-        ask(network, HOLD)
-    answer = ask(network, COUPLE)
-    if answer == NO_NUMBERS:
-        line, where = first_not_finite(tables)
-        return NOT_FINITE, line, where
-    if not answer > 0.0:
-        return (SINGULAR if answer == 0.0 else NOT_CONVERGED), -1, -1
-    return (OK if task.what == CORRECTION else OPEN), -1, -1
-
-
-@inner
-def find_part(network, task, s, it, rub):
-    """The part of the corrections that is made, and their size as Newton compares it, its line and cell."""
-    shift, turn, size, line, where = size_up(network.tables, s.ca)
-    moves = network.moves
-    moves[FAR], moves[TURNED] = 0.0, 0.0
-    ask(network, MEASURE)
-    far, turned = moves[FAR] / task.limits.reach, moves[TURNED]
-    shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
-    part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
-    if turn * part > LARGEST_TURN:
-        part = LARGEST_TURN / turn
-    if rub and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
-        part *= 0.5
-    return min(part, ask(network, SAFE_PART)), size, line, where
-
-
-@inner
-def make_corrections(network, s, part):
-    """Lines and borders move by a part of their corrections."""
-    network.asked.part = part
-    for l in range(network.tables.shape[0]):
-        job = read(network.tables[l])
-        update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
-    ask(network, UPDATE)
-
-
-@inner
-def iterate(network, task, s):
-    """Newton's iterations: outcome, their number, predicted next correction, line and cell, whether it was cut short."""
-    most, rub = task.limits.most, give_scheme(network, task, s)
-    before, left, size = math.inf, math.inf, math.inf
-    outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
-    ask(network, FORGET)
-    while it < most and outcome == NOT_CONVERGED:
-        it += 1
-        found, line, where = find_corrections(network, task, s, it)
-        if found != OPEN:
-            outcome, before = found, math.inf
-            break
-        part, size, line, where = find_part(network, task, s, it, rub)
-        make_corrections(network, s, part)
-        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
-        before = size if part == 1.0 else math.inf
-        if task.what == EQUILIBRIUM:
-            outcome = NOT_CONVERGED if network.moves[STRENGTH] > 1.0 else outcome
-            ask(network, RELAX)
-    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
-    if cut_short:
-        outcome = OK
-        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
-            left = size
-    return outcome, it, left, line, where, cut_short
-
-
-@kernel(inlined=False)
-def solve_network(table):
-    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a network (NetworkJob).
-
-    JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
-    Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
-    """
-    network = read_network(table)
-    tables, task = network.tables, task_of(network.asked)
-    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
-    if task.what == STEP:
-        task, s, fails, turn, line, cell = predict_step(network, task, network.asked.time)
-        if fails:
-            return TURNED_TOO_FAR, 0, turn, line, cell
-    else:
-        start_here(network.old, network.work)
-    outcome, it, left, line, where, cut_short = iterate(network, task, s)
-    if task.what == STEP or task.what == EQUILIBRIUM:
-        ask(network, CARRY)
-        carry_lines(tables, s, task.what)
-    if task.what == STEP:
-        bad, line_of_bad, cell = end_network_step(network, task, s, outcome == OK)
-        if bad != OK:
-            outcome, line, where = bad, line_of_bad, cell
-        elif cut_short:
-            outcome = CUT_SHORT
-    if task.what == ASSEMBLY and outcome == OK:
-        begin_books(tables, network.joints, network.asked.time)
-        book_bodies(network.work, 0.0)
-    return outcome, it, left, line, where
 
 
 # Numbers of a sample of a body.

@@ -118,7 +118,7 @@ class StepsJob(NamedTuple):
     reeled: NDArray[np.int64]  # (W, ..) tables of kernels.mesh.remesh.RemeshJob, of lines where that needs no Python
     reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
-    solver: int = 0  # address of kernels.run.network.solve_network
+    solver: int = 0  # address of kernels.run.newton.solve_network
     leader: int = 0  # of kernels.junctions.network_job.lead_lone; 0: no line can come near what is free
     finder: int = 0  # and of find_near
     book: int = 0  # of book_network_step

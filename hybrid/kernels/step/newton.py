@@ -1,15 +1,12 @@
-"""Newton's method for one step of a line, in time or at rest, and what it works on.
+"""What Newton's method works on and asks of a line, for one step, in time or at rest (kernels.run.newton).
 
-Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
-tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.march).
-
-`solve` is inlined in the one entry to all that needs the march (kernels.run.entry): a second one would compile it once more.
+`plane` and `space`: for which kind of line (kernels.march.march).
 
 `Job` has all that steps of a line need, by reference: it is the table of an entry of kernels.run.entry.
 
 What is beside the band of the line is a border.  Newton asks all of them a question in one place, by the function that is
-named here, and in this order; of a line that does not have it each costs a comparison.  The Newton of joined lines
-(kernels.run.network) asks the same functions of each line where no border of joined lines takes their place.
+named here, and in this order; of a line that does not have it each costs a comparison.  Of joined lines it asks the same
+functions of each line where no border of joined lines takes their place.
 
     border                     prepare       before_march     after_march  couple      safe_part  carry
     torque through catenaries                torques                       correction             powers
@@ -20,7 +17,7 @@ named here, and in this order; of a line that does not have it each costs a comp
 
 Sheaves that turn freely are borders of all lines (kernels.junctions.sheaves_and_winches): a line by itself has none.
 
-The powers of torques and the energy of contact are of a step that is found alone (`solve`, `end_line_step`).
+The powers of torques and the energy of contact are of a step that is found alone (`end_line_step`).
 """
 
 from __future__ import annotations
@@ -31,16 +28,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.block_elimination import substitute
-from hybrid.kernels.algebra.plane import substitute_planar
 from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, caller_of_six, reader
-from hybrid.kernels.march.assembly_plane import march_planar
-from hybrid.kernels.march.march import first_bad, march, measure, update
-from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
+from hybrid.kernels.march.zone_torque import BEFORE_MARCH, CORRECT
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.report import FRICTION, RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.report import FRICTION, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import (
     Ends,
     Floats,
@@ -56,8 +49,8 @@ from hybrid.kernels.state.state import (
     no_sea,
     no_work,
 )
-from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
-from hybrid.kernels.step.step_control import Scheme, before_fixed, radius_of_step, scheme
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step
+from hybrid.kernels.step.step_control import before_fixed, radius_of_step
 
 # The same of a step of a line that may touch itself: longer ones feed the vibrations that contact leaves.
 LARGEST_CONTACT_TURN = 0.3
@@ -215,6 +208,17 @@ call_slip = caller_of_six(0)
 AT_REST = 1e30
 
 
+@inner
+def size_of(turn, shift, pull, big, limits, noise):
+    """What Newton compares with its tolerance, of the correction of a line.
+
+    turn: rad, of a chord; shift: m, of a node; pull, big: N, change of a tension, and the largest one; noise: N, of
+    round-off.
+    """
+    size = max(turn, WHOLE * shift / limits.reach)
+    return size if pull < noise else max(size, pull / max(big, LOW_TENSION * limits.scale))
+
+
 # --- borders of a line: one of them at a time ---------------------------------------------------------------
 
 
@@ -354,108 +358,3 @@ def end_line_step(plane, space, task, job, states, s):
         job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job, FINISH)
     turn, cell = end_step(plane, space, job.line, job.sea, job.ends, states, s, task, job.work, job.books.strains)
     return not turn < most_turn(job), turn, cell
-
-
-# --- Newton of a line by itself ------------------------------------------------------------------------------
-
-
-@inner
-def find_correction(plane, space, task, job, states, s, where):
-    """One march and the solution of its equations with all borders, into work.x.
-
-    Returns OPEN, or the outcome with which the solution ends here, and the cell or node where it fails; else `where`.
-    """
-    line, work, new, bad, good = job.line, job.work, states.new, -1, True
-    before_march(space, job, states, s, task.what)
-    if space is not None:
-        bad = march(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
-    if plane is not None:
-        bad = march_planar(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
-    if bad >= 0:
-        if not work.report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
-            return NOT_FINITE, int(work.report[RESIDUAL_NODE])
-        return SINGULAR, bad
-    if task.what == ASSEMBLY:
-        return OK, where
-    after_march(job, task.what)
-    if space is not None:
-        good = substitute(work.X, work.x)
-    if plane is not None:
-        good = substitute_planar(plane, work.X, work.x)
-    coupled = couple(space, job, states, s, task.what, good)
-    if not good:
-        return NOT_FINITE, first_bad(work.x, new.e)
-    if task.what == CORRECTION:
-        return OK, where
-    return (OPEN if coupled else NOT_CONVERGED), where
-
-
-@inner
-def find_part(task, job, new, s, it, noise):
-    """The part of the correction that is made, its size as Newton compares it, and its cell; noise: N, of round-off."""
-    reach, scale, _, _ = task.limits
-    shift, turn, where, pull, big = measure(new.e, new.T, job.work.x)
-    part = 1.0
-    if shift > reach and not task.turning:
-        part = reach / shift
-    if turn * part > LARGEST_TURN:
-        part = LARGEST_TURN / turn
-    if rubs(job) and s.cv > 0.0 and it in (7, 10, 13):
-        part *= 0.5  # it goes round between sticking and sliding, or feet of contact between two pieces
-    part = min(part, safe_part(job))
-    turn = max(turn, WHOLE * shift / reach)
-    return part, (turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))), where
-
-
-@inner
-def solve(plane, space, task, job, states):
-    """Do a task at the configuration `new` of `States`, of a step that starts at old.r.
-
-    STEP            predict `new` from `old`, solve, find the rates; books.strains: of elements, empty: not wanted
-    EQUILIBRIUM     solve from the prediction in work.u and `new`
-    ASSEMBLY        one march, for its report and its block rows
-    CORRECTION      one march and the solution of its equations, into work.x
-
-    Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
-    prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
-    may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
-    is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
-    """
-    line, work, new, s = job.line, job.work, states.new, Scheme(task.dt, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
-    if task.what == STEP:
-        safe, rho = prepare(job, task.rho)
-        task = with_radius(task, rho)
-        s = scheme(task.rho, task.before, task.rho_before, task.dt)
-        far, turn, where = begin_line_step(plane, space, job, states, s, safe)
-        if far:
-            return TURNED_TOO_FAR, 0, turn, where
-    before, left, size = math.inf, math.inf, math.inf
-    noise = round_off_tension(line, s.ca, task.limits.scale)
-    outcome, it, where = NOT_CONVERGED, 0, -1
-    while it < task.limits.most and outcome == NOT_CONVERGED:
-        it += 1
-        found, where = find_correction(plane, space, task, job, states, s, where)
-        if found != OPEN:
-            outcome, before = found, math.inf
-            break
-        part, size, where = find_part(task, job, new, s, it, noise)
-        update(plane, space, line, new, s.cv, s.ca, part, task.turning, work)
-        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
-        before = size if part == 1.0 else math.inf
-    cut_short = task.cut and outcome == NOT_CONVERGED and it == task.limits.most and before < math.inf
-    if cut_short:
-        outcome = OK
-        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
-            left = size
-    if task.what == STEP:
-        find_rates(space, line, job.sea, states.old, new, work.u, s)
-    if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
-        carry(job, states, s, task.what)
-    pass_torque(space, job, new, AFTER_STEP, s.cv)
-    if task.what == STEP and outcome == OK:
-        far, turn, cell = end_line_step(plane, space, task, job, states, s)
-        if far:
-            outcome, where = TURNED_TOO_FAR, cell
-        elif cut_short:
-            outcome = CUT_SHORT
-    return outcome, it, left, where

@@ -1,0 +1,325 @@
+"""Newton's method: one loop, for a line by itself and for lines that are joined.
+
+Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
+tensions, frames and rates.  Of joined lines each is marched by the kernel of a line, which is called by its address.
+
+What it works on, and what is beside the band of a line: kernels.step.newton.  What couples lines is a border, points and
+bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
+`plane` and `space`: for which kind of line (kernels.march.march); numba drops what stands behind `is not None` of what is
+None, so that neither solution is compiled with the other.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.block_elimination import substitute
+from hybrid.kernels.algebra.plane import substitute_planar
+from hybrid.kernels.junctions.bodies import book_bodies, start_here
+from hybrid.kernels.junctions.borders import (
+    BALANCE,
+    BLOCK,
+    CARRY,
+    COUPLE,
+    FAR,
+    FORGET,
+    HOLD,
+    MEASURE,
+    NO_NUMBERS,
+    RELAX,
+    SAFE_PART,
+    STRENGTH,
+    TURNED,
+    UPDATE,
+    ask,
+)
+from hybrid.kernels.junctions.network_job import read_network, task_of
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.assembly_plane import march_planar
+from hybrid.kernels.march.march import first_bad, march, measure, update
+from hybrid.kernels.march.zone_torque import AFTER_STEP
+from hybrid.kernels.run.network import (
+    JUNCTIONS,
+    begin_books,
+    carry_lines,
+    end_network_step,
+    first_not_finite,
+    give_scheme,
+    march_lines,
+    predict_step,
+    size_up,
+)
+from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.step.newton import (
+    ASSEMBLY,
+    CORRECTION,
+    CUT_SHORT,
+    EQUILIBRIUM,
+    LARGEST_TURN,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    OPEN,
+    SINGULAR,
+    STEP,
+    TURNED_TOO_FAR,
+    WHOLE,
+    after_march,
+    before_march,
+    begin_line_step,
+    carry,
+    couple,
+    end_line_step,
+    has_converged,
+    pass_torque,
+    prepare,
+    read,
+    round_off_tension,
+    rubs,
+    safe_part,
+    size_of,
+    with_radius,
+)
+from hybrid.kernels.step.step import find_rates
+from hybrid.kernels.step.step_control import Scheme, scheme
+
+
+@inner
+def damped_part(part, turn, rub, s, it):
+    """The part of corrections that is made in iteration `it`, of a safe part of them that turn a chord by `turn` (rad)."""
+    if turn * part > LARGEST_TURN:
+        part = LARGEST_TURN / turn
+    if rub and s.cv > 0.0 and it in (7, 10, 13):
+        part *= 0.5  # it goes round between sticking and sliding, or feet of contact between two pieces
+    return part
+
+
+@inner
+def iterate(line, lines, task, s):
+    """Newton's iterations of a line by itself, or else of lines that are joined; what is not solved is None.
+
+    Returns outcome, iterations, predicted next correction, line and cell, and whether the last iteration is cut short.
+    """
+    before, left, size = math.inf, math.inf, math.inf
+    outcome, it, worst, where, easier = NOT_CONVERGED, 0, -1, -1, False
+    while it < task.limits.most and outcome == NOT_CONVERGED:
+        it += 1
+        if line is not None:
+            found, worst, where = correct_line(line, task, s, where)
+        if lines is not None:
+            found, worst, where = correct_lines(lines, task, s, it)
+        if found != OPEN:
+            outcome, before = found, math.inf
+            break
+        if line is not None:
+            part, size, worst, where = part_of_line(line, task, s, it)
+            move_line(line, task, s, part)
+        if lines is not None:
+            part, size, worst, where = part_of_lines(lines, task, s, it)
+            easier = move_lines(lines, task, s, part)
+        outcome, left = has_converged(size, before, it, part, task.limits.tolerance)
+        before = size if part == 1.0 else math.inf
+        if easier:
+            outcome = NOT_CONVERGED
+    cut_short = task.cut and outcome == NOT_CONVERGED and it == task.limits.most and before < math.inf
+    if cut_short:
+        outcome = OK
+        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
+            left = size
+    return outcome, it, left, worst, where, cut_short
+
+
+# --- a line by itself ----------------------------------------------------------------------------------------
+
+
+@inner
+def correct_line(of, task, s, where):
+    """One march and the solution of its equations with all borders, into work.x.
+
+    where: the cell or node that was worst.  Returns OPEN, or the outcome with which the solution ends here, the line, and
+    the cell or node where it fails; else `where`.
+    """
+    plane, space, job, states, _ = of
+    return find_correction(plane, space, task, job, states, s, where)
+
+
+@inner
+def find_correction(plane, space, task, job, states, s, where):
+    """The same for one kind of line."""
+    line, work, new, bad, good = job.line, job.work, states.new, -1, True
+    before_march(space, job, states, s, task.what)
+    if space is not None:
+        bad = march(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
+    if plane is not None:
+        bad = march_planar(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
+    if bad >= 0:
+        if not work.report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
+            return NOT_FINITE, 0, int(work.report[RESIDUAL_NODE])
+        return SINGULAR, 0, bad
+    if task.what == ASSEMBLY:
+        return OK, 0, where
+    after_march(job, task.what)
+    if space is not None:
+        good = substitute(work.X, work.x)
+    if plane is not None:
+        good = substitute_planar(plane, work.X, work.x)
+    coupled = couple(space, job, states, s, task.what, good)
+    if not good:
+        return NOT_FINITE, 0, first_bad(work.x, new.e)
+    if task.what == CORRECTION:
+        return OK, 0, where
+    return (OPEN if coupled else NOT_CONVERGED), 0, where
+
+
+@inner
+def part_of_line(of, task, s, it):
+    """The part of the correction that is made, its size, and its cell."""
+    _, _, job, states, noise = of
+    limits = task.limits
+    shift, turn, where, pull, big = measure(states.new.e, states.new.T, job.work.x)
+    part = 1.0
+    if shift > limits.reach and not task.turning:
+        part = limits.reach / shift
+    part = min(damped_part(part, turn, rubs(job), s, it), safe_part(job))
+    return part, size_of(turn, shift, pull, big, limits, noise), 0, where
+
+
+@inner
+def move_line(of, task, s, part):
+    """Move the line by a part of its correction."""
+    plane, space, job, states, _ = of
+    update(plane, space, job.line, states.new, s.cv, s.ca, part, task.turning, job.work)
+
+
+@inner
+def solve(plane, space, task, job, states):
+    """Do a task at the configuration `new` of `States`, of a step that starts at old.r.
+
+    STEP            predict `new` from `old`, solve, find the rates; books.strains: of elements, empty: not wanted
+    EQUILIBRIUM     solve from the prediction in work.u and `new`
+    ASSEMBLY        one march, for its report and its block rows
+    CORRECTION      one march and the solution of its equations, into work.x
+
+    Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
+    prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
+    may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
+    is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
+    """
+    line, work, new, s = job.line, job.work, states.new, Scheme(task.dt, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
+    if task.what == STEP:
+        safe, rho = prepare(job, task.rho)
+        task = with_radius(task, rho)
+        s = scheme(task.rho, task.before, task.rho_before, task.dt)
+        far, turn, where = begin_line_step(plane, space, job, states, s, safe)
+        if far:
+            return TURNED_TOO_FAR, 0, turn, where
+    of = (plane, space, job, states, round_off_tension(line, s.ca, task.limits.scale))
+    outcome, it, left, _, where, cut_short = iterate(of, None, task, s)
+    if task.what == STEP:
+        find_rates(space, line, job.sea, states.old, new, work.u, s)
+    if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
+        carry(job, states, s, task.what)
+    pass_torque(space, job, new, AFTER_STEP, s.cv)
+    if task.what == STEP and outcome == OK:
+        far, turn, cell = end_line_step(plane, space, task, job, states, s)
+        if far:
+            outcome, where = TURNED_TOO_FAR, cell
+        elif cut_short:
+            outcome = CUT_SHORT
+    return outcome, it, left, where
+
+
+# --- lines that are joined -----------------------------------------------------------------------------------
+
+
+@inner
+def correct_lines(of, task, s, it):
+    """Corrections of iteration `it` of all lines and borders, in space; as of `correct_line`."""
+    network, _ = of
+    tables = network.tables
+    line, where = march_lines(network, task.what == STEP)
+    if line >= 0:
+        report = read(tables[line]).work.report
+        if not report[RESIDUAL] < math.inf:
+            return NOT_FINITE, line, int(report[RESIDUAL_NODE])
+        return SINGULAR, line, where
+    ask(network, BALANCE)
+    if task.what == ASSEMBLY:
+        carry_lines(tables, s, task.what)  # rates of twist are known now
+        return OK, -1, -1
+    ask(network, BLOCK)
+    if task.what == JUNCTIONS:
+        return OK, -1, -1
+    if task.what == EQUILIBRIUM and it == 1:
+        ask(network, HOLD)
+    answer = ask(network, COUPLE)
+    if answer == NO_NUMBERS:
+        line, where = first_not_finite(tables)
+        return NOT_FINITE, line, where
+    if not answer > 0.0:
+        return (SINGULAR if answer == 0.0 else NOT_CONVERGED), -1, -1
+    return (OK if task.what == CORRECTION else OPEN), -1, -1
+
+
+@inner
+def part_of_lines(of, task, s, it):
+    """The part of the corrections that is made, and their size, its line and cell."""
+    network, rub = of
+    shift, turn, size, line, where = size_up(network.tables, s.ca)
+    moves = network.moves
+    moves[FAR], moves[TURNED] = 0.0, 0.0
+    ask(network, MEASURE)
+    far, turned = moves[FAR] / task.limits.reach, moves[TURNED]
+    shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
+    part = damped_part(min(1.0, 1.0 / shift) if shift > 0.0 else 1.0, turn, rub, s, it)
+    return min(part, ask(network, SAFE_PART)), size, line, where
+
+
+@inner
+def move_lines(of, task, s, part):
+    """Lines and borders move by a part of their corrections; whether equations of an equilibrium were easier ones."""
+    network, _ = of
+    network.asked.part = part
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
+        update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
+    ask(network, UPDATE)
+    if task.what != EQUILIBRIUM:
+        return False
+    easier = network.moves[STRENGTH] > 1.0
+    ask(network, RELAX)
+    return easier
+
+
+@kernel(inlined=False)
+def solve_network(table):
+    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a network (NetworkJob).
+
+    JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
+    Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
+    """
+    network = read_network(table)
+    tables, task = network.tables, task_of(network.asked)
+    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
+    if task.what == STEP:
+        task, s, fails, turn, line, cell = predict_step(network, task, network.asked.time)
+        if fails:
+            return TURNED_TOO_FAR, 0, turn, line, cell
+    else:
+        start_here(network.old, network.work)
+    of = (network, give_scheme(network, task, s))
+    ask(network, FORGET)
+    outcome, it, left, line, where, cut_short = iterate(None, of, task, s)
+    if task.what == STEP or task.what == EQUILIBRIUM:
+        ask(network, CARRY)
+        carry_lines(tables, s, task.what)
+    if task.what == STEP:
+        bad, line_of_bad, cell = end_network_step(network, task, s, outcome == OK)
+        if bad != OK:
+            outcome, line, where = bad, line_of_bad, cell
+        elif cut_short:
+            outcome = CUT_SHORT
+    if task.what == ASSEMBLY and outcome == OK:
+        begin_books(tables, network.joints, network.asked.time)
+        book_bodies(network.work, 0.0)
+    return outcome, it, left, line, where
