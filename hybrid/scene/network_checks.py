@@ -130,16 +130,27 @@ def floating_groups(network: Network) -> Iterator[Finding]:
 
 
 def _start_findings(network: Network) -> Iterator[Finding]:
-    """Lines of which some start in equilibrium and others do not, and a velocity that points do not have."""
+    """Lines of which some start in equilibrium and others do not, and a velocity that points and bodies do not have."""
     placed = [name for name, line in network.lines.items() if not isinstance(line.initial, Equilibrium)]
     for name, line in network.lines.items() if placed else ():
         if isinstance(line.initial, Equilibrium):
             expected = f"straight or points, because line {placed[0]} starts so, and nothing is in equilibrium then"
             fix = "say so of every line; points and bodies start at rest where initial_guess has them"
             yield Finding(("lines", name, "initial"), expected, fix, "equilibrium")
-        elif any(getattr(line.initial, "velocity", None) or ()) and any(map(network.is_joined, (line.start, line.end))):
-            expected = "rest, because the points of the line start at rest"
-            yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
+            continue
+        for point in filter(network.is_joined, (line.start, line.end) if any(_velocity(line)) else ()):
+            if isinstance(network.points[point], Fairlead) or network.clamped_at(point):
+                expected, fix = f"rest, because point {point} turns and starts at rest", "leave velocity out"
+            elif len({_velocity(network.lines[other]) for other, _ in network.lines_at(point)}) > 1:
+                expected, fix = f"that of the other lines that meet at point {point}", "give all of them this velocity"
+            else:
+                continue
+            yield Finding(("lines", name, "initial", "velocity"), expected, fix)
+
+
+def _velocity(line: JoinedLine) -> tuple[float, ...]:
+    """The velocity, m/s, with which a line begins."""
+    return tuple(getattr(line.initial, "velocity", None) or (0.0, 0.0, 0.0))
 
 
 def _touching_findings(network: Network) -> Iterator[Finding]:
@@ -206,12 +217,14 @@ def contradictions_of(network: Network, name: str, carrying: Sequence[str] = ())
 def _line_findings(network: Network, name: str) -> Iterator[Finding]:
     """What is wrong with a line and its points, each under its own key of the network."""
     wrong: dict[Finding, None] = {}  # each once
+    line = network.lines[name]
+    judged = () if network.is_held(line.start) or network.is_held(line.end) else (("initial", "velocity"),)
     for carrying in ((), *((key,) for key in network.carried(name))):
         found = contradictions_of(network, name, carrying)
         if not found:
             wrong |= dict.fromkeys(motion_findings(vars(network.scene_of(name, carrying))))
         # of an end that nothing holds the first shape is not judged: the other lines at its point hold it
-        wrong |= dict.fromkeys(x for x in found if not (carrying and x.at[:1] == ("initial",)))
+        wrong |= dict.fromkeys(x for x in found if not ((carrying and x.at[:1] == ("initial",)) or x.at in judged))
         if wrong:
             break
     yield from (_of_network(network, name, found) for found in wrong)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import test_system_saving as saving
 from test_system_saving import SEA, spar
 
 import hybrid
-from hybrid.errors import ComputationError, ResultError
+from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
 from hybrid.simulation import progress, run_of_lines
@@ -358,3 +359,52 @@ def test_many_times_are_not_all_read_at_every_stop() -> None:
     """A run of hours has 100 000 outputs: what it does at each must not grow with their number."""
     times = Counted([0.1 * k for k in range(100_000)])
     assert falls_on(7654.3, times, STEP) and times.reads < 30
+
+
+FLYING = {"kind": "straight", "direction": [1, 0, 0], "velocity": [1.0, 2.0, 0.5]}
+JOINED_IN_FLIGHT: dict[str, Any] = {
+    "environment": {"gravity": 9.81},
+    "points": {name: {"kind": "free", "initial_guess": [x, 0, 0]} for name, x in (("a", 0), ("knot", 5), ("b", 10))},
+    "lines": {
+        name: {
+            "start": start,
+            "end": end,
+            "sections": [{"length": 5.0, "mass": 1.0, "bending_stiffness": 10.0, "axial_stiffness": 1e5}],
+            "initial": FLYING,
+            "mesh": {"cells": 10},
+        }
+        for name, start, end in (("one", "a", "knot"), ("two", "knot", "b"))
+    },
+    "time": {"duration": 1.0, "step": 0.01},
+}
+
+
+def test_joined_lines_that_begin_with_one_velocity_fly_together() -> None:
+    scene = copy.deepcopy(JOINED_IN_FLIGHT)
+    scene["points"]["knot"]["mass"] = 2.0
+    result = hybrid.run(scene)
+    for line in result.lines.values():
+        gone = line.position[-1] - line.position[0]
+        assert gone == pytest.approx(np.broadcast_to([1.0, 2.0, 0.5 - 0.5 * 9.81], gone.shape), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"kind": "straight", "direction": [1, 0, 0]}, "that of the other lines that meet at point knot"),
+        ({**FLYING, "velocity": [1.0, 2.0, 0.6]}, "that of the other lines that meet at point knot"),
+    ],
+)
+def test_a_line_does_not_leave_the_lines_that_it_is_joined_to(change: dict[str, Any], expected: str) -> None:
+    scene = copy.deepcopy(JOINED_IN_FLIGHT)
+    scene["lines"]["two"]["initial"] = change
+    with pytest.raises(SceneError, match=expected):
+        hybrid.validate_scene(scene)
+
+
+def test_what_turns_starts_at_rest() -> None:
+    scene = copy.deepcopy(JOINED_IN_FLIGHT)
+    for line, key in (("one", "end"), ("two", "start")):
+        scene["lines"][line]["connections"] = {key: {"kind": "clamped", "tangent": [1, 0, 0]}}
+    with pytest.raises(SceneError, match="point knot turns and starts at rest"):
+        hybrid.validate_scene(scene)
