@@ -16,7 +16,7 @@ import pytest
 import hybrid
 from hybrid.kernels.contact.self_contact import contact_task
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.step.newton import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
+from hybrid.kernels.step.line_step import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
 from tests.inside import OnlyLine
 
 pytestmark = pytest.mark.bench

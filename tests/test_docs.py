@@ -213,10 +213,10 @@ def test_cited_equations_exist() -> None:
 
 # Every constant of docs/theory.md section 12 that stands alone in the code: module, name, value, as on the page.
 CONSTANTS = (
-    ("kernels.step.newton", "TOLERANCE", 1e-9, "10⁻⁹"),
-    ("kernels.step.newton", "ROUND_OFF", 1e-6, "10⁻⁶"),
-    ("kernels.step.newton", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
-    ("kernels.step.newton", "LARGEST_TURN", 0.7, "0.7 rad"),
+    ("kernels.step.line_step", "TOLERANCE", 1e-9, "10⁻⁹"),
+    ("kernels.step.line_step", "ROUND_OFF", 1e-6, "10⁻⁶"),
+    ("kernels.step.line_step", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
+    ("kernels.step.line_step", "LARGEST_TURN", 0.7, "0.7 rad"),
     ("kernels.step.step", "LARGEST_STEP_TURN", 1.0, "1 rad"),
     ("solve.stepper", "REACH", 0.1, "0.1 L"),
     ("solve.network_solver", "REACH", 0.1, "0.1 L"),

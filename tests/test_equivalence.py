@@ -1,7 +1,7 @@
 """The same cable said in two ways gives the same answer.
 
 Tolerance: Newton stops when the next correction would turn no chord by more than 1e-9
-(kernels.step.newton.TOLERANCE); two runs that round differently may then differ by some 1e-9 of
+(kernels.step.line_step.TOLERANCE); two runs that round differently may then differ by some 1e-9 of
 the length in statics and by some of these, accumulated over the steps, in motion.
 """
 

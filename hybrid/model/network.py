@@ -15,7 +15,7 @@ from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.report import MAY_MEET, MEETS_FROM, MEETS_TO, OBSTACLES, ONSET_OF, STRAND, TURNED
 from hybrid.kernels.state.state import Floats, State
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.model.bodies import (
     BodyModel,
     FairleadMotion,

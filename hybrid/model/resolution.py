@@ -69,7 +69,7 @@ REFINEMENTS_AT_REST = 6  # of an equilibrium, whose errors need not fall evenly
 ROUND_OFF = 1e-12  # of the force, the moment and the curvature typical of a scene
 OF_STRETCH = 1e-15  # of the tension that would stretch a line by its length
 OF_LENGTH = 2.5e-16  # of a length that inertia must account for in a step ..
-MOST_NOISE = 1e-3  # .. but at most this part of the force: a step with more does not converge (kernels.step.newton)
+MOST_NOISE = 1e-3  # .. but at most this part of the force: a step with more does not converge (kernels.step.line_step)
 # Half the diameter of a line that gives none, as a part of its length: no position is asked finer by a part of motion.
 SLENDER = 1e-4
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.

@@ -43,7 +43,7 @@ from hybrid.kernels.state.state import (
     Work,
     no_sea,
 )
-from hybrid.kernels.step.newton import RUN, Task, blank_job
+from hybrid.kernels.step.line_step import RUN, Task, blank_job
 from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.model.network import NetworkModel

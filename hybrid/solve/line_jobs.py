@@ -22,7 +22,7 @@ from hybrid.kernels.run.newton import solve_network
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
-from hybrid.kernels.step.newton import ASSEMBLY, RUN, Limits, Task, blank_job
+from hybrid.kernels.step.line_step import ASSEMBLY, RUN, Limits, Task, blank_job
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.borders import (
     JointJobs,

@@ -37,7 +37,7 @@ from hybrid.kernels.state.report import (
     WAVES,
 )
 from hybrid.kernels.state.state import Floats, State, Work
-from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, TOLERANCE, Limits, Task
+from hybrid.kernels.step.line_step import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, TOLERANCE, Limits, Task
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_law import REFUSED
 from hybrid.solve.contact import SelfContact, SharedContact, left_over
@@ -90,7 +90,7 @@ class NetworkSolver(LineJobs):
         self._make_tables()
 
     def _solve(self, task: Task, old: NetworkState, new: NetworkState, t: float = 0.0) -> NetworkTaken:
-        """Do a task (kernels.step.newton) from `old` to `new`, which is overwritten; t: s, of `new`.
+        """Do a task (kernels.step.line_step) from `old` to `new`, which is overwritten; t: s, of `new`.
 
         Lines that nothing joins or may join are solved one after the other, with the limits of each.
         """

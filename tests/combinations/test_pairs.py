@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 import hybrid
 from hybrid.errors import ComputationError, SceneError
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.read import _readable_tables, as_scene
 from hybrid.scene.root import LINE, Scene, in_full

@@ -17,7 +17,7 @@ from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of, replay
 from hybrid.designs.tangents import Unfollowed
 from hybrid.designs.wanted import parse_wanted
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import in_full
 from tests.combinations.pairs import as_network

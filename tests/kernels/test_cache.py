@@ -196,7 +196,7 @@ def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(
         "hybrid.kernels.run.network_run.run_network" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
     )
     field = "    itself: int = 0  # address of"
-    moved = changed("kernels/step/newton.py", field, "    another: int = 0\n" + field)
+    moved = changed("kernels/step/line_step.py", field, "    another: int = 0\n" + field)
     assert "hybrid.kernels.run.entry.in_plane" in moved and len(moved) < len(before)
 
 

@@ -11,7 +11,7 @@ from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import blank_line, blank_state, no_ends
-from hybrid.kernels.step.newton import ASKED, LIMIT, PREPARE, REST
+from hybrid.kernels.step.line_step import ASKED, LIMIT, PREPARE, REST
 from hybrid.solve.contact import SelfContact
 
 WIDTH = 0.1

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.model.bodies import frame_of
 from hybrid.model.build import build
 from hybrid.model.network import build_network

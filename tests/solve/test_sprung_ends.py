@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.model.build import build
 from hybrid.model.line import ABOUT_CHORDS, line_on
 from hybrid.scene.read import one_line

@@ -13,7 +13,7 @@ from scipy.optimize import root
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
 from hybrid.simulation.run import Run, new_run

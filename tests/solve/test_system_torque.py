@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.step.newton import TOLERANCE
+from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.simulation import lines_stiffness
 from tests.scenes import line_between, network_scene
 

@@ -69,7 +69,7 @@ from hybrid.kernels.state.report import (
     TOUCHES,
 )
 from hybrid.kernels.state.state import Ends, Line, Rows, State, Work, blanks
-from hybrid.kernels.step.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
+from hybrid.kernels.step.line_step import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.step.step_control import before_fixed, radius_of_step, scheme
 
 # Energy that a step may put in, and all steps together, as a part of the largest energy so far.

@@ -47,7 +47,7 @@ from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.machine.references import NamedNumbers, by_reference
 from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.newton import LIMIT, TOUCH
+from hybrid.kernels.step.line_step import LIMIT, TOUCH
 
 WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
 SAFE = 0.8  # part of the way to where the force is infinite that a correction may go

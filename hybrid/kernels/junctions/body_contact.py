@@ -65,7 +65,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.report import PLACE as CENTRE
 from hybrid.kernels.state.state import Blocks, Rows, blanks
-from hybrid.kernels.step.newton import CORRECTION, read
+from hybrid.kernels.step.line_step import CORRECTION, read
 
 # Columns of a node that touches a body.
 OF_LINE = 0

@@ -26,7 +26,7 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.state.state import blanks
-from hybrid.kernels.step.newton import read
+from hybrid.kernels.step.line_step import read
 
 START, END = 0, 1
 # Questions, and what a border does then; it answers 1 where nothing else is said.

@@ -78,7 +78,7 @@ from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.newton import CORRECTION, LARGEST_TURN, pass_torque, read
+from hybrid.kernels.step.line_step import CORRECTION, LARGEST_TURN, pass_torque, read
 
 # Columns of S; its rows are as the first of them.
 TENSION = 0  # of the start

@@ -68,7 +68,7 @@ from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
 from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
-from hybrid.kernels.step.newton import (
+from hybrid.kernels.step.line_step import (
     ASKED,
     FIND,
     FINISH,

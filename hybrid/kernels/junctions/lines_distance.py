@@ -26,7 +26,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import Floats, NumberRows, Rows, blanks
-from hybrid.kernels.step.newton import read
+from hybrid.kernels.step.line_step import read
 
 BOX = 8  # cells in a box
 # Of the width: way from line to line about a joint on which nothing is looked at; legs that leave it by 10 degrees or

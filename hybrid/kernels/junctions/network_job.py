@@ -19,7 +19,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import NamedNumbers, reader
 from hybrid.kernels.state.report import FREE, MEETS_FROM, MEETS_TO, ONSET_OF, PLACE, RADIUS, STRAND
 from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
-from hybrid.kernels.step.newton import Limits, Task, read
+from hybrid.kernels.step.line_step import Limits, Task, read
 
 
 class NetworkJob(NamedTuple):
@@ -67,7 +67,7 @@ class NetworkJob(NamedTuple):
 
 
 class NetworkTask(NamedNumbers):
-    """The task (kernels.step.newton.Task), the time of the new states, s, and the part of a correction that is made."""
+    """The task (kernels.step.line_step.Task), the time of the new states, s, and the part of a correction that is made."""
 
     what: float
     dt: float

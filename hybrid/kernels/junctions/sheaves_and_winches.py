@@ -44,7 +44,7 @@ from hybrid.kernels.reel.reel import MOVES, WAITS
 from hybrid.kernels.reel.reel import read as read_reel
 from hybrid.kernels.state.report import ALONE, BEARING, FREE, INERTIA, LEFT_OVER, SPIN, TRUE, YIELDING
 from hybrid.kernels.state.state import Blocks, Rows, blanks
-from hybrid.kernels.step.newton import STEP, read, wind
+from hybrid.kernels.step.line_step import STEP, read, wind
 
 
 class SpinningJob(NamedTuple):

@@ -35,7 +35,7 @@ from hybrid.kernels.mesh.zone_transfer import Transfer, carry_push, old_cell, pu
 from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, PLANAR, SEABED_ENERGY, TOUCHES, WAVES
 from hybrid.kernels.state.state import Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blanks
-from hybrid.kernels.step.newton import read
+from hybrid.kernels.step.line_step import read
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.watch.extremes import carry_extremes, fold_gone, match_nodes
 
@@ -285,7 +285,7 @@ def renew(table):
 
 @kernel
 def before_forces(table):
-    """What the assembly of a state as it is has to know; table: of a kernels.step.newton.Job of parity 0."""
+    """What the assembly of a state as it is has to know; table: of a kernels.step.line_step.Job of parity 0."""
     job = read(table)
     clock = job.books.clock
     ends_at(clock.now, job.moves, job.sea, job.ends, job.books.velocity)

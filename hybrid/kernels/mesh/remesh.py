@@ -46,7 +46,7 @@ from hybrid.kernels.state.state import (
     blank_line,
     blanks,
 )
-from hybrid.kernels.step.newton import ASSEMBLY, RUN
+from hybrid.kernels.step.line_step import ASSEMBLY, RUN
 
 Numbers = NDArray[np.int64]
 

@@ -35,7 +35,7 @@ from hybrid.kernels.state.state import (
     remembers,
     slip_size,
 )
-from hybrid.kernels.step.newton import (
+from hybrid.kernels.step.line_step import (
     ASSEMBLY,
     CORRECTION,
     EQUILIBRIUM,

@@ -63,7 +63,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.report import TURNED as TURNED_AXES
 from hybrid.kernels.step.accept import book_torques, impose_now, keep_past, watch
-from hybrid.kernels.step.newton import (
+from hybrid.kernels.step.line_step import (
     ASSEMBLY,
     GAIN,
     OK,

@@ -52,7 +52,7 @@ from hybrid.kernels.state.books import (
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import note_cuts, renew_accelerations, watch_push
-from hybrid.kernels.step.newton import (
+from hybrid.kernels.step.line_step import (
     CUT_SHORT,
     GAIN,
     OK,

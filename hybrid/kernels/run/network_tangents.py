@@ -61,7 +61,7 @@ from hybrid.kernels.run.network_run import load_bodies
 from hybrid.kernels.state.books import HEAD, SAMPLE_POSITION, Clock, Counts
 from hybrid.kernels.state.report import NET_A, WAVES
 from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
-from hybrid.kernels.step.newton import with_radius
+from hybrid.kernels.step.line_step import with_radius
 from hybrid.kernels.step.step_control import scheme
 from hybrid.kernels.watch.tangents import (
     ALONE,

@@ -3,7 +3,7 @@
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
 tensions, frames and rates.  Of joined lines each is marched by the kernel of a line, which is called by its address.
 
-What it works on, and what is beside the band of a line: kernels.step.newton.  What couples lines is a border, points and
+What it works on, and what is beside the band of a line: kernels.step.line_step.  What couples lines is a border, points and
 bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
 `plane` and `space`: for which kind of line (kernels.march.march); numba drops what stands behind `is not None` of what is
 None, so that neither solution is compiled with the other.
@@ -50,7 +50,7 @@ from hybrid.kernels.run.network import (
     size_up,
 )
 from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.step.newton import (
+from hybrid.kernels.step.line_step import (
     ASSEMBLY,
     CORRECTION,
     CUT_SHORT,
@@ -293,7 +293,7 @@ def move_lines(of, task, s, part):
 
 @kernel(inlined=False)
 def solve_network(table):
-    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a network (NetworkJob).
+    """Do a task (kernels.step.line_step: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a network (NetworkJob).
 
     JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.

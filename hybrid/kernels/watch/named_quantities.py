@@ -37,7 +37,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.books import VON_MISES, WALL_TENSION
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import Floats, Sea
-from hybrid.kernels.step.newton import RUN, read
+from hybrid.kernels.step.line_step import RUN, read
 from hybrid.kernels.watch.extremes import curvature_at, has_one_value, load_on_side, tension_at, widen
 from hybrid.kernels.watch.sides import element_strain, passed_torque, strain_on_side
 
