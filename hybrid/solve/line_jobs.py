@@ -56,6 +56,7 @@ class LineJobs:
     tolerance: float  # of Newton's method in steps
     body_work: Floats  # (B, WORK)
     net: Floats  # (P, 3) N
+    _part: JointJobs | None = None  # jobs of the lines that are solved together, where these are not all
 
     def __init__(
         self, lines: Sequence[JoinedLine], bodies: Floats, contacts: Sequence[SelfContact | None],
@@ -96,7 +97,6 @@ class LineJobs:
         self._pressed = room_to_meet(self._nodes, self._rides, len(bodies)) if self._rides.size else {}
         self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
         self._marcher = 0  # address of the kernel that marches joined lines; 0: nobody has asked for it
-        self._part: JointJobs | None = None  # jobs of the lines that are solved together, where these are not all
         self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), NetworkTask()
 
     def _make_tables(self) -> None:
