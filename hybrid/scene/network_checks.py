@@ -142,7 +142,7 @@ def _start_findings(network: Network) -> Iterator[Finding]:
             if isinstance(network.points[point], Fairlead) or network.clamped_at(point):
                 expected, fix = f"rest, because point {point} turns and starts at rest", "leave velocity out"
             elif len({_velocity(network.lines[other]) for other, _ in network.lines_at(point)}) > 1:
-                expected, fix = f"that of the other lines that meet at point {point}", "give all of them this velocity"
+                expected, fix = f"that of the other lines that meet at point {point}", "leave velocity out, or give it to all of them"
             else:
                 continue
             yield Finding(("lines", name, "initial", "velocity"), expected, fix)
@@ -192,10 +192,8 @@ def _moment_findings(network: Network, name: str) -> Iterator[Finding]:
 
 
 def _accuracy_asked(network: Network) -> Accuracy | None:
-    """What is asked of all lines, or of one; a chosen model brings along that of steps that follow the motion."""
-    follows = network.time is not None and network.time.controlled
-    of_lines = () if follows else (line.accuracy for line in network.lines.values())
-    return network.accuracy or next((x for x in of_lines if x is not None), None)
+    """What is asked of all lines, or of one."""
+    return network.accuracy or next((x.accuracy for x in network.lines.values() if x.accuracy is not None), None)
 
 
 def _load_findings(network: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:

@@ -119,7 +119,7 @@ def test_a_straight_line_that_nothing_holds_begins_where_its_first_point_is(more
     ("changes", "told"),
     [
         ({"lines.lower.initial": None}, "line upper starts so"),
-        ({"lines.upper.initial": DOWN | {"velocity": [1, 0, 0]}}, "the points of the line start at rest"),
+        ({"lines.upper.initial": DOWN | {"velocity": [1, 0, 0]}}, "that of the other lines that meet at point weight"),
         ({"lines.upper.initial": {"kind": "straight", "direction": [1, 0, 0]}}, "lines.upper.initial.direction"),
         ({"lines.lower.initial": {"kind": "points", "points": [[0, 0, -4], [0, 0, -7.9]]}}, "lines.lower.initial"),
     ],
