@@ -142,7 +142,8 @@ def _start_findings(network: Network) -> Iterator[Finding]:
             if isinstance(network.points[point], Fairlead) or network.clamped_at(point):
                 expected, fix = f"rest, because point {point} turns and starts at rest", "leave velocity out"
             elif len({_velocity(network.lines[other]) for other, _ in network.lines_at(point)}) > 1:
-                expected, fix = f"that of the other lines that meet at point {point}", "leave velocity out, or give it to all of them"
+                expected = f"that of the other lines that meet at point {point}"
+                fix = "leave velocity out, or give it to all of them"
             else:
                 continue
             yield Finding(("lines", name, "initial", "velocity"), expected, fix)
