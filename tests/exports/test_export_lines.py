@@ -80,17 +80,6 @@ def test_a_file_opens_in_xarray(folder: Path, file: str, engine: Any) -> None:
         each.close()
 
 
-@pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
-@pytest.mark.needs("netCDF4")
-def test_a_file_opens_in_netcdf(folder: Path, file: str) -> None:
-    import netCDF4 as netcdf
-
-    with netcdf.Dataset(folder / file) as opened, hybrid.open(folder / file) as result:
-        west = opened["lines/west"]
-        assert west["tension"].dimensions == ("t", "s")
-        assert np.array_equal(west["tension"][:], result.lines["west"].tension)
-
-
 @pytest.mark.needs("pandas")
 def test_points_and_bodies_are_exported_under_their_names(folder: Path, call: Call) -> None:
     """As `hybrid.export` of the result does; a name of lines is a file of each, at the places that are asked for."""

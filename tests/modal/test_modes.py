@@ -210,11 +210,9 @@ def test_riser_of_huera_huarte():
         "length": 13.12, "mass": mass, "diameter": 0.028, "bending_stiffness": 29.88, "axial_stiffness": 1e9,
         "torsional_stiffness": 1e3, "added_mass": {"normal": 1.0, "tangential": 0.0}, "rotary_inertia": 0.0,
     }  # fmt: skip
-    top = {"kind": "guided", "tangent": [0, 0, 1], "force": [0, 0, 1188.28]}
     pull = 1188.28 / 1e9 * 13.12
     weight = (mass - 1000.0 * area) * G * 13.12
     height = 13.12 + pull - 0.5 * weight * 13.12 / 1e9
-    del top
     made = scene(
         section, pinned(0, 0, -20), pinned(0, 0, -20 + height), "rod", 200, G,
         environment={"fluid": {"density": 1000.0, "surface": 0.0}},

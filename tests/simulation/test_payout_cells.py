@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +20,12 @@ from tests.simulation.test_payout_zones import touching
 FOLLOWING = {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0, "curvature_error": 0.05}
 
 
-def pinned(rate: float, side: str = "end", model: Any = FOLLOWING, **more: Any) -> dict[str, Any]:
+def pinned(rate: float, model: Any = FOLLOWING, **more: Any) -> dict[str, Any]:
     """The line of `touching` from a winch at which it turns freely."""
-    scene = touching(rate, model, side, **more)
-    scene["ends"][side]["kind"] = "pinned"
-    del scene["ends"][side]["tangent"]
+    scene = touching(rate, model, **more)
+    scene["ends"]["end"]["kind"] = "pinned"
+    del scene["ends"]["end"]["tangent"]
     return scene
-
-
-@cache
-def followed(rate: float) -> hybrid.Result:
-    """It with cells that follow, from a winch at its end."""
-    return hybrid.run(pinned(rate))
 
 
 def change_cells(line: OnlyLine, random: np.random.Generator, part: float) -> None:
@@ -101,7 +94,7 @@ def test_cells_behind_a_clamped_winch_are_short_where_no_mesh_is_given(rate: flo
 def test_as_rods_whose_cells_are_short_everywhere(rate: float, part: float) -> None:
     """Nearer to 320 rods than rods as long as its base cells, and its energy is balanced as theirs is."""
     fine, coarse = (hybrid.run(pinned(rate, model="rod", mesh={"cells": n})) for n in (320, 40))
-    found = followed(rate)
+    found = hybrid.run(pinned(rate))
     off = [np.abs(x["position"] - fine["position"]).max() for x in (found, coarse)]
     pulls = [np.linalg.norm(x["reaction_end"], axis=1) for x in (found, coarse, fine)]
     assert off[0] < part * off[1]
@@ -109,17 +102,6 @@ def test_as_rods_whose_cells_are_short_everywhere(rate: float, part: float) -> N
     left = [np.abs(x["work/scheme"]).max() for x in (found, fine)]
     assert left[0] < 1.1 * left[1]
     assert found.mesh[-1].s.size < 0.75 * fine.mesh[-1].s.size
-
-
-@pytest.mark.parametrize("rate", [0.8, -0.8])
-def test_a_winch_at_the_start_is_the_mirror_image(rate: float) -> None:
-    found, mirror = followed(rate), hybrid.run(pinned(rate, side="start"))
-    np.testing.assert_allclose(mirror["position"][:, ::-1], found["position"], atol=1e-9)
-    np.testing.assert_allclose(mirror["reaction_start"], found["reaction_end"], atol=1e-9 * 4000.0)
-    for name in ("curvature", "tension"):
-        for bound in ("min", "max"):
-            x, y = (r[f"envelope/{name}_{bound}"] for r in (found, mirror))
-            np.testing.assert_allclose(y[::-1][: x.size // 2], x[: x.size // 2], rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("model", [FOLLOWING, {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0}])

@@ -220,6 +220,7 @@ MIRRORED: dict[str, tuple[Tables, float]] = {
     **{f"a winch, {model} {dimension}": (of_winch(model, step=0.1) | ({"dimension": dimension} if dimension else {}), 1e-8)
        for model, dimension in (("catenary", None), ("rod", 3), ("clamped", None), ("clamped", 3))},
     "zones that move": (zones.touching(-0.8), 1e-5),
+    **{f"cells that follow {rate}": (cells.pinned(rate), 1e-7) for rate in RATES},
 }  # fmt: skip
 
 

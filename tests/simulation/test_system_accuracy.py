@@ -89,6 +89,8 @@ def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> 
             assert one["asked"] == pytest.approx(0.015 * forces)
             assert one["error"] == line[f"errors/total/end_force_{end}"].max()
             assert one["met"] is (one["error"] <= one["asked"])
+    largest = max(line.attributes["error_total_end_force"] for line in result.lines.values())
+    assert result.attributes["error_total_end_force"] == largest
     assert len({int(line.attributes["cells"]) for line in result.lines.values()}) > 1  # each has a mesh of its own
     steps = np.diff(result.lines["tow"]["steps/t"])
     assert steps.max() > 2.0 * steps.min()  # and they follow the motion
@@ -217,29 +219,6 @@ def mooring(cells: int = 20, step: float = 0.1, **output: Any) -> dict[str, Any]
         fluid={"density": 1025, "current": [0.4, 0.1, 0]}, time=(8.0, step),
         output={"every": 0.4, "points": 11} | output
     )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def result_estimated(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
-    path = tmp_path_factory.mktemp("errors") / "run.h5"
-    hybrid.run(mooring(errors=True), path).close()
-    return hybrid.open(path)
-
-
-def test_figures_are_near_the_truth(result_estimated: hybrid.Result) -> None:
-    truth = hybrid.run(mooring(80, 0.025))
-    for name, line in result_estimated.lines.items():
-        fine = truth.lines[name]
-        assert np.allclose(line.times, fine.times)
-        wrong = np.linalg.norm(line.position - fine.position, axis=2).max()
-        assert 0.5 < line["errors/total/position"].max() / wrong < 6.0, name
-        for end in ("start", "end"):
-            off = np.linalg.norm(line[f"reaction_{end}"] - fine[f"reaction_{end}"], axis=1).max()
-            assert 0.5 < line[f"errors/total/end_force_{end}"].max() / off < 6.0, (name, end)
-        assert line.attributes["error_total_position"] == line["errors/total/position"].max()
-    largest = max(x.attributes["error_total_end_force"] for x in result_estimated.lines.values())
-    assert result_estimated.attributes["error_total_end_force"] == largest
-    assert result_estimated.lines["hose"].dims("errors/mesh/bending_moment") == ("t", "s")
 
 
 @pytest.mark.parametrize("more", [{}, {"accuracy": {"tension": "10%"}}])

@@ -12,27 +12,14 @@ import test_system_saving as saving
 from test_system_saving import SEA, spar
 
 import hybrid
-from hybrid.errors import ComputationError, ResultError, SceneError
+from hybrid.errors import ResultError, SceneError
 from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
 from hybrid.simulation import progress, run_of_lines
 from hybrid.simulation import run as run_module
 from tests.scenes import line_between, network_scene
 
-SECTION = {"length": 108, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
-BODY = {"mass": 400, "volume": 3.0, "height": 2.0, "drag_area": 2.0, "added_mass": 300}
-PINNED = {"position": [0, 0, -100.0]}
 TIME = {"duration": 12.0, "step": 0.05}
-
-
-def buoy(**tables: Any) -> dict[str, Any]:
-    """A buoy at the surface on one line, as a network."""
-    return {
-        "environment": SEA,
-        "points": {"anchor": PINNED, "buoy": {"kind": "free", "initial_guess": [40, 5, -1]} | BODY},
-        "lines": {"riser": {"start": "anchor", "end": "buoy", "sections": [SECTION], "mesh": {"cells": 30}}},
-        "time": TIME,
-    } | tables
 
 
 def mooring(**tables: Any) -> dict[str, Any]:
@@ -132,13 +119,6 @@ def test_chains_on_the_seabed_bear_what_they_weigh() -> None:
     assert abs(borne + contact - weight) < 1e-6 * weight
     level = [result[f"points/{x}/force"][-1, :2] for x in ("west", "east")]
     assert np.abs(level[0] + level[1]).max() < 1e-6 * np.abs(level[0]).max()
-
-
-def test_a_line_that_stays_stretched_beyond_its_limit_stops_with_its_name() -> None:
-    section = SECTION | {"max_strain": 1e-4}
-    tables = buoy(lines={"riser": {"start": "anchor", "end": "buoy", "sections": [section], "mesh": {"cells": 30}}})
-    with pytest.raises(ComputationError, match="line riser"):
-        hybrid.run(tables)
 
 
 def test_a_force_on_a_point_that_is_let_go_ends_where_it_says() -> None:

@@ -240,13 +240,6 @@ def cells(line: hybrid.Result) -> list[int]:
     return [mesh.s.size - 1 for mesh in line.mesh]
 
 
-@pytest.fixture(scope="module")
-def three_cells(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
-    path = tmp_path_factory.mktemp("cells") / "three.h5"
-    hybrid.run(followed(), path).close()
-    return hybrid.open(path)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     "model", [FOLLOWS | {"force_rod": [[0, 250]]}, FOLLOWS | {"hold_time": 2.0}], ids=["rod", "zones"]
@@ -268,21 +261,6 @@ def test_cells_change_without_python_as_with_it(model: Tables, monkeypatch: pyte
     for name in ("position", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max"):
         assert np.abs(line[name] - cable[name]).max() <= 1e-9 * np.abs(cable[name]).max(), name
     assert np.array_equal(whole["points/end/position"], line.position[:, -1])
-
-
-@pytest.mark.long  # 1.5 s
-def test_against_rods_cells(three_cells: hybrid.Result) -> None:
-    """The curvature within the share of its largest that is asked for, with a quarter of the cells."""
-    scene = mooring()
-    for line in scene["lines"].values():
-        line |= {"model": "rod", "mesh": {"cells": 240}}
-    rods = hybrid.run(scene)
-    for name, line in three_cells.lines.items():
-        fine = rods.lines[name]
-        assert len({*cells(line)}) > 2 and np.mean(cells(line)) < 0.3 * 240, name
-        assert np.abs(line.curvature - fine.curvature).max() < SHARE * fine.curvature.max(), name
-        assert np.abs(line.position - fine.position).max() < 1e-3 * 60.0, name
-        assert np.abs(line.tension - fine.tension).max() < 0.01 * fine.tension.max(), name
 
 
 @pytest.mark.long

@@ -99,22 +99,6 @@ def test_a_line_on_obstacles_has_a_diameter() -> None:
         hybrid.validate_scene(tables)
 
 
-def test_a_wall_and_a_ball_hold_a_line_as_a_cylinder_does() -> None:
-    """A rope lies on a floor: what it presses with is its weight, and it lies a fiftieth of its diameter deep."""
-    floor = {"floor": {"kind": "plane", "at": [0, 0, 0], "normal": [0, 0, 2]},
-             "ball": {"kind": "sphere", "at": [0, 0, -9.9], "radius": 10.0}}  # fmt: skip
-    tables = falling(0.01, obstacles=floor)
-    tables["ends"]["start"] = {"kind": "pinned", "position": [-1.0, 0, 0.3]}
-    tables["initial"] = "equilibrium"
-    result = hybrid.static(hybrid.validate_scene(tables))
-    z = result.position[0, :, 2]
-    ball = np.linalg.norm(result.position[0] - [0, 0, -9.9], axis=1) - 10.0
-    assert z.min() > 0.01 - 0.05 * 0.02
-    assert ball.min() > 0.01 - 0.05 * 0.02
-    held = float(result.reaction_start[0, 2])
-    assert 0.0 < held < 0.5 * 0.2 * 9.81 * 2.0
-
-
 def test_an_equilibrium_within_an_obstacle_is_refused() -> None:
     """A line between two points on both sides of a wall that it cannot go round."""
     tables = over_pipe(obstacles={"wall": {"kind": "sphere", "at": [5, 0, 1.5], "radius": 4.5}})

@@ -251,7 +251,7 @@ def test_twist_without_stress_is_no_torque():
 # --- what no ratio may depend on ------------------------------------------------------------------------
 
 
-def whole_case(seed, reverse=False):
+def whole_case(seed):
     """A state that has something of everything: a bed under a part, a clump, two sections, clamps, twist, bends."""
     rng = np.random.default_rng(seed)
     n = 14
@@ -265,17 +265,12 @@ def whole_case(seed, reverse=False):
     sections = [{"length": 6.5}, {"length": 3.5, "bending_stiffness": 6.0}]
     at = float(base[6])
     ends = [clamped_at((0, 0, 0), (1, 0, 0)), clamped_at((10, 0, 0), (1, 0, 0))]
-    if reverse:
-        sections, at = sections[::-1], 10.0 - at
     what = cable(start=ends[0], end=ends[1], sections=sections, attachments=[{"kind": "clump", "at": at, "mass": 2.0}])
     zones = layout(base, parts.tolist(), flags)
-    if reverse:
-        zones = layout(10.0 - base[::-1], parts[::-1].tolist(), flags[::-1])
-    forward = layout(base, parts.tolist(), flags)
-    N = int(forward.counts.sum())
+    N = int(zones.counts.sum())
     d = X + 0.3 * rng.uniform(-1, 1, (N, 3))
     d /= np.linalg.norm(d, axis=1)[:, None]
-    e = np.diff(forward.nodes)[:, None] * d
+    e = np.diff(zones.nodes)[:, None] * d
     r = np.vstack([np.zeros(3), np.cumsum(e, axis=0)])
     spin = np.cumsum(rng.uniform(-0.3, 0.3, N))
     a1 = untwisted(e)
@@ -284,8 +279,6 @@ def whole_case(seed, reverse=False):
     tangents = X + 0.2 * rng.uniform(-1, 1, (2, 3))
     tangents /= np.linalg.norm(tangents, axis=1)[:, None]
     offset = float(np.median(r[:, 2]))
-    if reverse:
-        r, e, a1, T, before, tangents = r[::-1], -e[::-1], a1[::-1], T[::-1], before[::-1], -tangents[::-1]
     return what, zones, r, e, a1, T, before, tangents, offset
 
 
@@ -306,10 +299,7 @@ def ratios_of(case, turn=None, shift=None):
     )
 
 
-SEEDS = range(8)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", range(8))
 def test_turned_and_moved(seed):
     """The whole scene turned and moved, the plane of the bed with it: the same ratios.  Round-off over angle^2."""
     case = whole_case(seed)
@@ -318,15 +308,6 @@ def test_turned_and_moved(seed):
     was = ratios_of(case)
     assert (was[[BEND, SLACK, CLAMP, POINT, EDGE, TORSION]].max(axis=1) > 0).all()
     assert ratios_of(case, turn, np.array([30.0, -20.0, 7.0])) == pytest.approx(was, rel=1e-9)
-
-
-@pytest.mark.parametrize("name", ["bend", "slack", "clamp", "point", "edge", "torsion"])
-def test_the_ends_swapped(name):
-    """The same cable counted from its other end: the same ratios, in reverse order."""
-    k = [x.name for x in CRITERIA].index(name)
-    for seed in SEEDS:
-        was, swapped = ratios_of(whole_case(seed)), ratios_of(whole_case(seed, reverse=True))
-        assert swapped[k, ::-1] == pytest.approx(was[k], rel=1e-9), seed
 
 
 # --- NaN, givens ----------------------------------------------------------------------------------------
