@@ -63,7 +63,7 @@ def test_watching_that_finds_nothing(count: int, monkeypatch: pytest.MonkeyPatch
     for _ in range(RUNS):
         on.append(cpu(tables))
         with monkeypatch.context() as patch:
-            patch.setattr(lines_contact, "watched_pairs", lambda *_: [])
+            patch.setattr(lines_contact, "watched_pairs", lambda *_: np.zeros((0, 2), np.int64))
             off.append(cpu(tables))
     print(f"\n{count} lines of {CELLS} cells: watched {min(on):.3f} s, not {min(off):.3f} s, {min(on) / min(off):.3f}")
     assert min(on) < 1.1 * min(off)

@@ -475,15 +475,14 @@ def touching_among(
 
     scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
     """
-    names, pairs = list(network.lines), [*pairs]
-    lines = sorted({k for pair in pairs for k in pair})
-    if not lines:
+    names, found = list(network.lines), np.array([*pairs], np.int64).reshape(-1, 2)
+    if not len(found):
         return None
-    place = {k: j for j, k in enumerate(lines)}
+    lines, rubs = np.unique(found).tolist(), 0.0 if network.contact is None else network.contact.friction
     meets, friction = np.zeros((len(lines), len(lines)), np.int64), np.zeros((len(lines), len(lines)))
-    for a, b in pairs:
-        for j, k in ((place[a], place[b]), (place[b], place[a])):
-            meets[j, k], friction[j, k] = 1, network.contact.friction if network.contact is not None else 0.0
+    meets[tuple(np.searchsorted(lines, found).T)] = 1
+    meets |= meets.T
+    friction[meets > 0] = rubs
     for j, k in enumerate(lines):
         line, scene = network.lines[names[k]], scenes[names[k]]
         reach = self_reach(scene)

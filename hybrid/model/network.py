@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,16 @@ from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MASS, MOM
 from hybrid.kernels.junctions.joined_lines import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.report import MAY_MEET, MEETS_FROM, MEETS_TO, OBSTACLES, ONSET_OF, STRAND, TURNED
+from hybrid.kernels.state.report import (
+    MAY_MEET,
+    MEETS_FROM,
+    MEETS_TO,
+    OBSTACLES,
+    ONSET_OF,
+    SELF_CONTACT,
+    STRAND,
+    TURNED,
+)
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.model.bodies import (
@@ -115,6 +125,12 @@ class NetworkModel:
     def cells(self) -> int:
         """Cells of all lines."""
         return sum(model.cells for model in self.models)
+
+    @cached_property
+    def asks_contact(self) -> bool:
+        """Whether contact is computed of lines with each other, with themselves or with bodies."""
+        touches = any(x.line.bits & SELF_CONTACT for x in self.models)
+        return touches or self.touching is not None or bool(self.rides.size)
 
     def load_bodies(self, t: float, out: Floats, since: float = 0.0) -> None:
         """Write what acts on the bodies at t (s; infinity: of full size) into `out` (B, NUMBERS).

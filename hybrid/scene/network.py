@@ -574,9 +574,9 @@ class Network(SceneTables, Asked):
         if start is None or end is None:
             return places
         distance = math.dist(start, end)
-        part = REACHED * line.cable.length / distance if distance > 0.0 and not self.starts_as_placed else 1.0
+        part = REACHED * line.cable.length / distance if distance > 0.0 else 1.0
         for key, (x, y, z), (a, b, c) in (("end", end, start), ("start", start, end)):
-            if part < 1.0 and not self.is_held(names[key]):
+            if part < 1.0 and not self.is_held(names[key]) and not self.starts_as_placed:
                 places[key] = (a + part * (x - a), b + part * (y - b), c + part * (z - c))
                 break
         return places

@@ -186,8 +186,7 @@ def group_of(model: NetworkModel, t: float, bodies: Floats) -> Group:
 
 def _is_alone(model: NetworkModel, number: int) -> bool:
     """Whether a line is joined to nothing that moves and asks for no contact: what it finds, no other line knows."""
-    asks = model.touching is not None or model.rides.size or any(x.line.bits & SELF_CONTACT for x in model.models)
-    return not asks and max(model.joints[number]) < 0
+    return not model.asks_contact and max(model.joints[number]) < 0
 
 
 def _parts_of(model: NetworkModel) -> list[tuple[int, ...]]:

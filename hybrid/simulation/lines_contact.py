@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,6 @@ from hybrid.kernels.junctions.lines_distance import (
     OTHER,
     ROOM,
     TIME,
-    WATCHED,
     blank_lines_job,
     watch_lines,
 )
@@ -337,6 +335,7 @@ PASSED = "lines pass through each other"  # kind of an event
 # Parts of a straight way between two shapes, and by how much the Gauss integral of two lines jumps where one passes
 # through the other: by 1, and by far less in a part of a way on which none does.
 OUTLINE_PARTS, JUMP = 48, 0.5
+PLANES = 20  # normals of a plane between two shapes that are tried
 FLAT = 1e-9  # volume, over the lengths, of chords that lie in one plane but for round-off, as neighbours do
 
 
@@ -384,8 +383,40 @@ def crossed(touching: Touching, first: NetworkState, last: NetworkState) -> Iter
     for j, a in enumerate(touching.lines):
         beside = touching.meets[j] & ((lows[j] <= highs) & (lows <= highs[j])).all(axis=1)
         for k in np.flatnonzero(beside[j + 1 :]) + j + 1:
-            if jumps(ways[j], ways[k]) > JUMP:
+            if may_pass(ways[j], ways[k]) and jumps(ways[j], ways[k]) > JUMP:
                 yield a, touching.lines[k]
+
+
+def may_pass(a: Floats, b: Floats) -> bool:
+    """Whether two polylines may pass through each other on their straight ways; a, b: as of `jumps`.
+
+    They cannot where a plane lies between them all the way, or between parts of theirs, by which this goes on.
+    """
+    if lie_apart(a.reshape(-1, 3), b.reshape(-1, 3)):
+        return False
+    if a.shape[1] < b.shape[1]:
+        a, b = b, a
+    middle = a.shape[1] // 2
+    return middle < 2 or may_pass(a[:, : middle + 1], b) or may_pass(a[:, middle:], b)
+
+
+def lie_apart(a: Floats, b: Floats) -> bool:
+    """Whether a plane is found between points (n, 3) m and (m, 3) m, which may touch it; by Gilbert's method.
+
+    Its normal is the shortest way known between what lies within those, and is made shorter by what lies farthest
+    beyond the plane.
+    """
+    way, size = a.mean(axis=0) - b.mean(axis=0), float(np.abs(a).max() + np.abs(b).max())
+    for _ in range(PLANES):
+        beyond = a[(a @ way).argmin()] - b[(b @ way).argmax()]
+        length, reach = float(way @ way), float(beyond @ way)
+        if length == 0.0:
+            return False
+        if reach >= -FLAT * size * math.sqrt(length):
+            return True
+        turn = beyond - way
+        way = way + min((length - reach) / float(turn @ turn), 1.0) * turn
+    return False
 
 
 def _of_as_many_nodes(a: Floats, b: Floats) -> list[Floats]:
@@ -409,11 +440,13 @@ def pair_text(shared: SharedContact, model: NetworkModel) -> str:
 # --- lines between which no contact is computed -------------------------------------------------------
 
 
-def watched_pairs(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
-    """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
-    thick = [k for k, x in enumerate(model.models) if (diameters(x) > 0.0).all()]
-    touching = model.touching
-    return [(a, b) for a, b in combinations(thick, 2) if touching is None or b not in touching.partners(a)]
+def watched_pairs(network: Network, model: NetworkModel) -> NDArray[np.int64]:
+    """Numbers (n, 2) of lines, in order, that have diameters, and between which no contact is computed."""
+    thick, touching = np.array([(diameters(x) > 0.0).all() for x in model.models]), model.touching
+    watched = np.triu(thick[:, None] & thick, 1)
+    if touching is not None:
+        watched[np.ix_(touching.lines, touching.lines)] &= touching.meets == 0
+    return np.argwhere(watched)
 
 
 def _joined_by_place(network: Network, width: float) -> NDArray[np.int64]:
@@ -440,9 +473,14 @@ class LinesWatch:
         alone: Collection[tuple[int, int]] = (),
     ) -> None:  # fmt: skip
         """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""
-        may = set(combinations(model.may_meet, 2)) - set(alone)
-        rows = [(*x, MET * (x in met), x in may, 0) for x in watched_pairs(network, model)]
-        self._pairs = np.array(rows, np.int64).reshape(-1, WATCHED)
+        pairs, lines = watched_pairs(network, model), len(model.models)
+        may, known = np.zeros((lines, lines), np.int64), np.zeros((lines, lines), np.int64)
+        may[np.ix_(model.may_meet, model.may_meet)] = 1
+        for each, of, value in ((may, alone, 0), (known, met, MET)):
+            for pair in of:
+                each[pair] = value
+        a, c = pairs.T
+        self._pairs = np.column_stack([a, c, known[a, c], may[a, c], np.zeros_like(a)])
         self._room = np.zeros((len(self._pairs), ROOM))
         width = [diameters(x) for x in model.models]
         begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
@@ -479,16 +517,14 @@ class LinesWatch:
 
     def met(self) -> list[tuple[int, int, float, float, float]]:
         """Lines that have met, two each: numbers, when (s), and at which arc lengths (m)."""
-        return [
-            (int(a), int(b), float(row[TIME]), float(row[AT]), float(row[OTHER]))
-            for (a, b, has, *_), row in zip(self._pairs, self._room, strict=True)
-            if has == MET
-        ]
+        return [(a, c, *row[[TIME, AT, OTHER]].tolist()) for a, c, row in self._that_have(MET)]
 
     def near(self) -> list[tuple[int, int, float, float]]:
         """Lines that are near each other, and contact begins, two each: numbers, and at which arc lengths (m)."""
-        return [
-            (int(a), int(b), float(row[AT]), float(row[OTHER]))
-            for (a, b, has, *_), row in zip(self._pairs, self._room, strict=True)
-            if has == NEAR
-        ]
+        return [(a, c, *row[[AT, OTHER]].tolist()) for a, c, row in self._that_have(NEAR)]
+
+    def _that_have(self, has: int) -> Iterator[tuple[int, int, Floats]]:
+        """Numbers of lines, two each, that have met, or are near, and the row of what is known of that."""
+        for k in np.flatnonzero(self._pairs[:, HAVE_MET] == has).tolist():
+            a, c = self._pairs[k, :2].tolist()
+            yield a, c, self._room[k]

@@ -138,8 +138,8 @@ def crossings(network: Network, model: NetworkModel, rest: NetworkState) -> list
         x.start_shape == GIVEN or not (network.is_joined(line.start) or network.is_joined(line.end))
         for x, line in zip(model.models, network.lines.values(), strict=True)
     ]
-    pairs = [(a, b) for a, b in watched_pairs(network, model) if known[a] and known[b]]
-    among = touching_among(network, model.scenes, pairs)
+    pairs = watched_pairs(network, model)
+    among = touching_among(network, model.scenes, pairs[np.array(known)[pairs].all(axis=1)])
     if among is None:
         return []
     return [*crossed(among, _before_current(replace(model, touching=among)), rest)]

@@ -43,8 +43,8 @@ ROWS = 512
 CELL_STEPS = 200_000
 # Waves that cost a cell in a step what all else does.
 WAVES_OF_A_CELL = 10
-# Numbers that the buffer of samples may hold, 16 MB.
-MOST_SAMPLED = 2_000_000
+# Numbers that the buffer of samples may hold, 8 MB.
+MOST_SAMPLED = 1_000_000
 # Of steps that have become short: kernels.state.books.Counts.
 LENGTHS = "tiny_steps", "cut_by_gain", "cut_by_turn", "cut_by_newton", "cut_by_error", "cut_at"
 

@@ -36,6 +36,9 @@ GROWTH = 1 << 20
 METADATA = 128 * 1024 * 1024  # bytes: the most that HDF5 takes
 MORE_SPACE = "free some disk space; close programs that hold the file"  # advice
 _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
+# Bytes of a page of a new file, and pages that wait in memory.
+_PAGE = 1 << 18
+_MOST_PAGES = 16
 
 
 # ---- reading --------------------------------------------------------------------------------------
@@ -133,29 +136,85 @@ def check_place(path: Path, example: str) -> None:
         raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
 
 
-class _Draft(io.FileIO):
+class _Draft(io.RawIOBase):
     """A file that HDF5 writes through Python: it never hears of an error, which is raised when it has closed the file.
 
     What HDF5 cannot write when it closes a file ends the process: SIGSEGV in 12 of 12 (tests/store/test_disk_full.py).
+    It writes 300 bytes at a time, most of them near those before: pages that were used last wait in memory.
     """
 
     error: OSError | None = None
 
-    def write(self, data: Any) -> int:
-        left = memoryview(data)
+    def __init__(self, path: Path, mode: str) -> None:
+        self._file = io.FileIO(path, mode)
+        self._pages: dict[int, memoryview] = {}  # by number, in the order of their last use
+        self._at, self._size, self._last = 0, self._file.seek(0, os.SEEK_END), -1
+
+    def seek(self, to: int, whence: int = os.SEEK_SET) -> int:
+        self._at = to + (0, self._at, self._size)[whence]
+        return self._at
+
+    def _ahead(self, size: int) -> memoryview:
+        """So many bytes from here on, or those to the end of a page, which are left behind."""
+        number, begin = divmod(self._at, _PAGE)
+        if number != self._last:
+            page = self._pages.pop(number, None)
+            if page is None:
+                self._file.seek(number * _PAGE)
+                page = memoryview(bytearray(self._file.read(_PAGE).ljust(_PAGE, b"\0")))
+                if len(self._pages) == _MOST_PAGES:
+                    self._put(next(iter(self._pages)))
+            self._pages[number], self._last = page, number
+        part = self._pages[number][begin : begin + size]
+        self._at += part.nbytes
+        return part
+
+    def _put(self, number: int) -> None:
+        """Write a page, which waits no more."""
+        left = self._pages.pop(number)[: max(self._size - number * _PAGE, 0)]
         try:
+            self._file.seek(number * _PAGE)
             while self.error is None and left.nbytes:
-                left = left[super().write(left) :]
+                left = left[self._file.write(left) :]
         except OSError as error:
             self.error = error
-        return memoryview(data).nbytes
+
+    def write(self, data: Any) -> int:
+        left = memoryview(data)
+        size = left.nbytes
+        self._size = max(self._size, self._at + size)
+        while left.nbytes:
+            part = self._ahead(left.nbytes)
+            part[:], left = left[: part.nbytes], left[part.nbytes :]
+        return size
+
+    def readinto(self, into: Any) -> int:
+        left = memoryview(into)
+        left = left[: max(self._size - self._at, 0)]
+        size = left.nbytes
+        while left.nbytes:
+            part = self._ahead(left.nbytes)
+            left[: part.nbytes], left = part, left[part.nbytes :]
+        return size
 
     def truncate(self, size: int | None = None) -> int:
+        self._size = self._at if size is None else size
+        self.put_all()
         try:
-            return super().truncate(size)
+            return self._file.truncate(self._size)
         except OSError as error:
             self.error = self.error or error
-            return size or 0
+            return self._size
+
+    def put_all(self) -> None:
+        """Write what waits."""
+        for number in [*self._pages]:
+            self._put(number)
+        self._last = -1
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
 
 
 @contextmanager
@@ -164,6 +223,7 @@ def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
     with _Draft(path, f"{mode.rstrip('+')}+") as draft:
         with h5py.File(draft, mode, libver=LIBVER) as file:
             yield file
+        draft.put_all()
         if draft.error is not None:
             raise draft.error
 
@@ -173,18 +233,15 @@ def redrafted(path: Path) -> AbstractContextManager[h5py.File]:
     return drafted(path, "r+")
 
 
-def created(path: Path, make: bytes | bytearray | Callable[[Path], None], many: bool = False) -> h5py.File:
-    """Make a file of these bytes, or by `make`, beside its place, open it to readers, and move it into place.
+def created(path: Path, make: Callable[[Path], None], many: bool = False) -> h5py.File:
+    """Make a file beside its place, open it to readers, and move it into place.
 
     many: it has so many datasets that nothing of them is to wait in memory until a chunk is full.
 
     So an older result survives a failed start, and a reader who has it open keeps what he sees.
     """
     with replacing(path) as new:
-        if isinstance(make, bytes | bytearray):
-            new.write_bytes(make)
-        else:
-            make(new)
+        make(new)
         if many:
             file = _opened_for_many(new)
         else:

@@ -97,11 +97,6 @@ def sign_new(path: Path) -> None:
         file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
 
 
-def tail_of(size: int, crc: int) -> bytes:
-    """What goes behind the end of a file of so many bytes: their sum."""
-    return _TAIL.pack(_NAME, size, crc)
-
-
 def sign(path: Path) -> None:
     """The same of a file in its place; ResultError."""
     try:
@@ -247,21 +242,24 @@ def pack(tree: Mapping[str, Any]) -> bytes:
     """A tree as bytes."""
     arrays = _Arrays()
     head = json.dumps(_plain(tree, arrays)).encode()
-    body = b"".join([len(head).to_bytes(8, "little"), head, *arrays.parts])
-    body = len(body).to_bytes(8, "little") + body
-    return MAGIC + hashlib.blake2b(body, digest_size=DIGEST).digest() + body
+    body = [len(head).to_bytes(8, "little"), head, *arrays.parts]
+    body.insert(0, (len(body[0]) + len(head) + arrays.size).to_bytes(8, "little"))
+    digest = hashlib.blake2b(digest_size=DIGEST)
+    for part in body:
+        digest.update(part)
+    return b"".join([MAGIC, digest.digest(), *body])
 
 
 class _Arrays:
-    """Bytes of arrays one after the other, and their number so far."""
+    """Arrays whose bytes are one after the other, and the number of these so far."""
 
     def __init__(self) -> None:
-        self.parts: list[bytes] = []
+        self.parts: list[Any] = []
         self.size = 0
 
-    def add(self, part: bytes) -> int:
+    def add(self, part: np.ndarray) -> int:
         """Where the part begins."""
-        at, self.size = self.size, self.size + len(part)
+        at, self.size = self.size, self.size + part.nbytes
         self.parts.append(part)
         return at
 
@@ -279,7 +277,7 @@ def _plain(x: Any, arrays: _Arrays) -> Any:
     name = x.dtype.newbyteorder("<").str
     if name not in DTYPES:
         raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
-    return {ARRAY: [name, list(x.shape), arrays.add(np.asarray(x, name).tobytes())]}
+    return {ARRAY: [name, list(x.shape), arrays.add(np.ascontiguousarray(x, name).reshape(-1).view("u1"))]}
 
 
 def unpack(data: bytes) -> Tree:

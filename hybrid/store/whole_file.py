@@ -12,7 +12,6 @@ needs neither: its result waits in memory (`LateFile`), is added to until all is
 from __future__ import annotations
 
 import os
-import zlib
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -40,8 +39,8 @@ from hybrid.store.format import (
     made,
     write_texts,
 )
-from hybrid.store.hdf5_file import GROUP, TOGETHER, image_of, in_memory, replacing
-from hybrid.store.integrity import Tree, tail_of
+from hybrid.store.hdf5_file import GROUP, TOGETHER, drafted, image_of, in_memory, replacing
+from hybrid.store.integrity import Tree, sign_new
 from hybrid.store.recorder import NUMBERS
 
 WAITS = 0.2  # s, that it waits at most while errors of the result are estimated, as outputs are held back
@@ -98,11 +97,9 @@ class LateFile:
             return
         self.placed = True
         with replacing(self.path, by_hdf5=True) as new:
-            image = image_of_result(self.contents, self._restart, self._outputs, True)
-            with new.open("wb") as file:
-                file.write(image)
-                file.write(tail_of(len(image), zlib.crc32(image)))
-                file.flush()
+            write_result(new, self.contents, self._restart, self._outputs, True)
+            sign_new(new)
+            with new.open("r+b") as file:
                 os.fsync(file.fileno())
 
     def may_stay(self) -> bool:
@@ -130,6 +127,20 @@ def groups_of(contents: ArrayContents) -> Iterator[tuple[str, ArrayContents]]:
         yield f"{GROUP}/{name}/", part
 
 
+def write_result(
+    path: Path, contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool
+) -> None:
+    """Write the file of a result, with the rows that it has; that of many lines is never in memory.
+
+    The rest: as of `image_of_result`; OSError: it cannot be written.
+    """
+    if len(contents.parts) < MOST_LINES:
+        path.write_bytes(image_of_result(contents, restart, outputs, complete))
+        return
+    with drafted(path) as file:
+        _write_lines(file, contents, restart, outputs, complete)
+
+
 def image_of_result(
     contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool
 ) -> bytes | bytearray:
@@ -139,32 +150,22 @@ def image_of_result(
     complete: whether no rows will be added before it is copied.
     """
     groups = dict(groups_of(contents))
-    few = len(groups) <= MOST_LINES
-    complete &= few and contents.size <= MOST_PLACED
+    if len(contents.parts) >= MOST_LINES:
+        file = in_memory()
+        _write_lines(file, contents, restart, outputs, complete)
+        return image_of(file)
+    complete &= contents.size <= MOST_PLACED
     of_groups = ((group, _shape_of(part, complete)) for group, part in groups.items())
     shape = (*of_groups, outputs, restart is not None, complete)
-    if few and shape not in _kept:
+    if shape not in _kept:
         if len(_kept) >= MOST_KEPT:
             _kept.clear()
         _kept[shape] = _template(groups, restart is not None, outputs, complete)
-    template, bare = _kept[shape] if few else Template(b"", {}), Bare(outputs, False)
+    template = _kept[shape]
     file = in_memory(template.content)
-    for k, (group, part) in enumerate(groups.items(), 1):
-        _fill(file, group, part, {} if few else bare.create(file, group, part), template.places)
-        if k % TOGETHER == 0:
-            file.flush()
-    bare.close()
-    if contents.parts:
-        file[GROUP].attrs["order"] = list(contents.parts)
-    if restart is not None:
-        if not few:
-            create_slots(file)
-        slots = [file[name] for name in SLOTS] if restart.checkpoints else []
-        for number, data in restart.checkpoints.items():
-            write_slot(slots, number, data)
-        write_before(file, restart.before)
-    if not template.places:
-        return image_of(file)
+    for group, part in groups.items():
+        _fill(file, group, part, {}, template.places)
+    _finish(file, contents, restart)
     image = bytearray(image_of(file))
     for (group, name), places in template.places.items():
         values = groups[group].data[name].values
@@ -172,6 +173,32 @@ def image_of_result(
             data = np.ascontiguousarray(values[rows]).tobytes()
             image[at : at + len(data)] = data
     return image
+
+
+def _write_lines(
+    file: h5py.File, contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool
+) -> None:
+    """Write a result of many lines, one after the other, to a new file."""
+    bare = Bare(outputs, False)
+    for k, (group, part) in enumerate(groups_of(contents), 1):
+        _fill(file, group, part, bare.create(file, group, part), {})
+        if k % TOGETHER == 0:
+            file.flush()
+    bare.close()
+    if restart is not None:
+        create_slots(file)
+    _finish(file, contents, restart)
+
+
+def _finish(file: h5py.File, contents: ArrayContents, restart: Restart | None) -> None:
+    """Write what is beside the datasets of a result and its lines."""
+    if contents.parts:
+        file[GROUP].attrs["order"] = list(contents.parts)
+    if restart is not None:
+        slots = [file[name] for name in SLOTS] if restart.checkpoints else []
+        for number, data in restart.checkpoints.items():
+            write_slot(slots, number, data)
+        write_before(file, restart.before)
 
 
 class Template(NamedTuple):

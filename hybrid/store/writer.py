@@ -72,7 +72,7 @@ from hybrid.store.hdf5_file import (
 from hybrid.store.integrity import Tree, copy_unsigned, pack, sign, sign_new
 from hybrid.store.recorder import NUMBERS, Rows, Table, pause, write_rows
 from hybrid.store.records import FINER_RESULT, PENDING
-from hybrid.store.whole_file import LateFile, Restart, image_of_result
+from hybrid.store.whole_file import LateFile, Restart, image_of_result, write_result
 
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here
 NOTHING_MORE: Tree = {}  # what a run that is done leaves to go on with
@@ -369,13 +369,14 @@ class Recorder(Rows):
 
     def _appear(self) -> None:
         """Let readers see a file, with all that there is now."""
-        self._continue_in(image_of_result(self.contents(), self._restart(), self._outputs_known, False))
+        asked = self.contents(), self._restart(), self._outputs_known, False
+        self._continue_in(lambda new: write_result(new, *asked))
 
-    def _continue_in(self, made: bytes | bytearray | Callable[[Path], None]) -> None:
-        """Write to a new file from now on; made: as of `created`."""
+    def _continue_in(self, make: Callable[[Path], None]) -> None:
+        """Write to a new file from now on; make: as of `created`."""
         assert self.path is not None
         self._broken = True  # until there is a file
-        self._file = created(self.path, made, many=bool(self._parts))
+        self._file = created(self.path, make, many=bool(self._parts))
         self._broken = False
         if self._parts:
             hold_metadata(self._file)

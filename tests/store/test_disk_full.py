@@ -6,6 +6,7 @@ could not write a file, with SIGSEGV, when it is closed or let go of.
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
@@ -20,8 +21,8 @@ import pytest
 import hybrid
 from hybrid.simulation import run as run_module
 from hybrid.simulation.line_result import LineResult
+from hybrid.store import hdf5_file, writer
 from hybrid.store import whole_file as store
-from hybrid.store import writer
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.format import Field, Header, MemoryTarget
 from hybrid.store.hdf5_file import opened
@@ -84,12 +85,15 @@ def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
 LATE = """
 import os, resource
 from hybrid.errors import ResultError
+from hybrid.store.recorder import Rows
 from hybrid.store.writer import WriteMode
-from test_result_file import ONE, recorder, values
+from test_result_file import GIVEN, ONE, recorder, values
 def write():
-    with recorder({path!r}, mode=WriteMode({{}}, late=True), overwrite=True) as r:
+    parts = {{str(k): Rows(GIVEN) for k in range({lines})}}
+    with recorder({path!r}, mode=WriteMode({{}}, late=True), overwrite=True, parts=parts) as r:
         for i in range(1000):
-            r.save(float(i), values(float(i)), ONE)
+            for x in (*parts.values(), r):
+                x.save(float(i), values(float(i)), ONE)
 write()
 size = os.path.getsize({path!r})
 before = open({path!r}, "rb").read()
@@ -104,10 +108,11 @@ for limit in (0, 20_000, size // 2, size - 10):  # while it is made, in its outp
 """
 
 
-def test_a_late_file_that_cannot_be_written_does_not_appear(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lines", [0, 10])  # which are made in memory, and in the file
+def test_a_late_file_that_cannot_be_written_does_not_appear(lines: int, tmp_path: Path) -> None:
     """And what was there before stays."""
     path = tmp_path / "run.h5"
-    said = said_by(LATE.format(path=str(path)))
+    said = said_by(LATE.format(path=str(path), lines=lines))
     assert said.count(f"{path} cannot be written") == 4 and "free" in said
     assert open_result(path).status == "complete"
 
@@ -144,6 +149,27 @@ def test_what_was_written_of_several_lines_stays(limit: int, tmp_path: Path) -> 
         t = line.times
         assert len(t) >= len(result.times) and (t == range(len(t))).all() and (line.tension[:, 0] == 10.0 * t).all()
     assert bool(len(result.times)) == (limit > 1_000_000)
+
+
+def test_a_file_that_waits_by_pages_is_what_was_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hdf5_file, "_PAGE", 64)
+    monkeypatch.setattr(hdf5_file, "_MOST_PAGES", 3)
+    random, plain, path = np.random.default_rng(0), io.BytesIO(), tmp_path / "draft"
+    with hdf5_file._Draft(path, "w+") as draft:
+        for k in range(500):
+            at, size = random.integers(0, 2000), int(random.integers(0, 300))
+            assert draft.seek(at) == plain.seek(at) and draft.read(size) == plain.read(size)
+            assert draft.tell() == plain.tell()
+            if at <= len(plain.getvalue()):
+                plain.seek(draft.seek(at))
+                assert draft.write(data := random.bytes(size)) == plain.write(data)
+            if k % 50 == 49:
+                assert draft.truncate(int(at)) == plain.truncate(at) or at > plain.seek(0, os.SEEK_END)
+                plain.seek(0, os.SEEK_END)
+                plain.write(bytes(max(int(at) - plain.tell(), 0)))
+            assert draft.seek(0, os.SEEK_END) == plain.seek(0, os.SEEK_END)
+        draft.put_all()
+        assert path.read_bytes() == plain.getvalue()
 
 
 # A file begins as one of the same datasets did before, if the process has made one.

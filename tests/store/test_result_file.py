@@ -496,7 +496,7 @@ def test_what_is_known_of_a_dataset_of_many_goes_when_it_is_closed(tmp_path: Pat
             made.create_dataset(f"x{k}", (0,), maxshape=(None,), chunks=(64,), dtype=float)
         made.flush()
         image = made.id.get_file_image()
-    with created(tmp_path / "many.h5", image, many=True) as file:
+    with created(tmp_path / "many.h5", lambda path: path.write_bytes(image), many=True) as file:
         hold_metadata(file)
         for k in range(20):
             data = file[f"x{k}"]
