@@ -10,6 +10,9 @@ the last two periods, in per cent: of a converged run of the same program, and o
 
 from __future__ import annotations
 
+import resource
+import subprocess
+import sys
 import tempfile
 import time as clock
 from pathlib import Path
@@ -294,13 +297,43 @@ def test_a_sheave_or_contact_of_one_line_slows_no_other() -> None:
         assert found < 1.3 * before
 
 
-def test_many_lines() -> None:
-    for cells, count, every, duration in ((100, 100, 60.0, 60.0), (100, 100, 1.0, 60.0), (20, 1000, 6.0, 6.0)):
-        step, whole = step_of(legs(cells, count, "catenary", every, duration))
-        steps, outputs = round(duration / 0.1), round(duration / every)
-        print(
-            f"\n{count} x {cells} cells, {outputs} outputs: {steps} steps in {steps * step:.2f} s, whole {whole:.2f} s"
-        )
+def side_by_side(cells: int, count: int, every: float, duration: float) -> dict[str, Any]:
+    """As of `legs`, 10 m from each other."""
+    tables = legs(cells, 1, "catenary", every, duration)
+    (line,), anchor, fairlead = tables["lines"].values(), tables["points"]["a0"], tables["points"]["f0"]
+    for k in range(count):
+        tables["points"][f"a{k}"] = anchor | {"position": [400.0, 10.0 * k, -100.0]}
+        tables["points"][f"f{k}"] = fairlead | {"position": [20.0, 10.0 * k, 0.0]}
+        tables["lines"][f"l{k}"] = line | {"start": f"a{k}", "end": f"f{k}"}
+    return tables
+
+
+def report(cells: int, count: int, every: float, duration: float, ring: bool, target: str) -> None:
+    """Print what a run of many lines takes, in a process of its own; target: empty: in memory."""
+    asked = every, duration
+    tables = legs(cells, count, "catenary", *asked) if ring else side_by_side(cells, count, *asked)
+    begin = clock.process_time()
+    with hybrid.run(tables, *filter(None, [target])) as result:
+        used, whole = result.lines["l0"]["steps/cpu"], clock.process_time() - begin
+        loop = float(used[-1] - used[0])
+    peak, where = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "with a file" if target else "in memory"
+    print(
+        f"{count} x {cells} cells, {'ring' if ring else 'side by side'}, {round(duration / every)} outputs, {where}: "
+        f"loop {loop:.2f} s, else {1e3 * (whole - loop) / count:.1f} ms a line, peak {peak:.0f} MB"
+    )
+
+
+@pytest.mark.parametrize("case", [(100, 100, 1.0, 60.0), (20, 300, 1.0, 6.0), (20, 1000, 1.0, 6.0)])
+def test_many_lines(case: tuple[int, int, float, float], tmp_path: Path) -> None:
+    """Side by side, and legs of a ring, whose bounds overlap; in memory and with a file."""
+    for ring in (False, True):
+        for target in ("", str(tmp_path / "many.h5")):
+            code = f"from test_bench_system_speed import report; report(*{case!r}, {ring!r}, {target!r})"
+            done = subprocess.run(
+                [sys.executable, "-c", code], cwd=Path(__file__).parent, capture_output=True, text=True
+            )
+            assert done.returncode == 0, done.stderr[-2000:]
+            print(done.stdout, end="")
 
 
 def stepped_from_outside(one_by_one: bool, joined: bool, steps: int = 1000) -> float:

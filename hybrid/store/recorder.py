@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 from math import isfinite, nan
 from types import SimpleNamespace, TracebackType
 from typing import Any, NamedTuple, Self
@@ -45,6 +46,12 @@ _PAUSE, _PART = 0.2, 10.0
 def pause(made: float) -> float:
     """How long (s) a run keeps to itself what it has, after a hand-over of which the making took `made` (s)."""
     return max(_PAUSE, _PART * made)
+
+
+@lru_cache(maxsize=4096)
+def _called(field: Field, name: str) -> Field:
+    """A field under the name of its dataset: lines that are alike have the same."""
+    return replace(field, name=name)
 
 
 class Mark(NamedTuple):
@@ -92,7 +99,7 @@ class Rows:
         for table in self._all:
             for (name, column), field in zip(table.columns().items(), table.fields, strict=True):
                 dims = (name,) if name == table.scale else (table.scale, *field.dims)
-                data[name] = ArrayDataset(replace(field, name=name), dims, column, grows=True)
+                data[name] = ArrayDataset(_called(field, name), dims, column, grows=True)
             table.count += table.waiting
             table.drop()
         self._replaced.clear()
