@@ -221,7 +221,7 @@ class _Draft(io.RawIOBase):
 def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
     """A new file that is made in one go; OSError when it could not be written."""
     with _Draft(path, f"{mode.rstrip('+')}+") as draft:
-        with h5py.File(draft, mode, libver=LIBVER) as file:
+        with h5py.File(draft, mode, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS) as file:
             yield file
         draft.put_all()
         if draft.error is not None:
