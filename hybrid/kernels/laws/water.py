@@ -166,9 +166,9 @@ def elevate(sea, r, u, first):
         A, w, kx, ky, phase = waves[j, 0], waves[j, 1], waves[j, 2], waves[j, 3], waves[j, 4]
         phase -= w * sea.now[0]
         for l in range(LANES):
-            c, s = cos_sin(kx * lanes[0, l] + ky * lanes[1, l] + phase)
-            lanes[10 + 2 * j, l], lanes[11 + 2 * j, l] = c, s
-            lanes[3, l] += A * c
+            lanes[10 + 2 * j, l], lanes[11 + 2 * j, l] = cos_sin(kx * lanes[0, l] + ky * lanes[1, l] + phase)
+        for l in range(LANES):  # by itself: with a sum in the loop above, that is not made of vector instructions
+            lanes[3, l] += A * lanes[10 + 2 * j, l]
     for l in range(LANES):
         eta = part * lanes[3, l]
         # Wheeler: the surface keeps what linear theory has at z = 0, the bed what it has there
