@@ -11,7 +11,8 @@ case ck = 0 and nothing else.  W holds one block row, five rows of
 
 After elimination  x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2}:  the linear
 relation that everything before node i imposes on what follows (docs/theory.md, 5).
-Rows without bending have four unknowns and take a path of their own in the same march.
+Rows without bending have four unknowns and take a path of their own in the same march; between two cells that are soft
+enough they have three, because the tension goes first (`eliminate_condensed`), and X_i is the same.
 
 Where X has room for more than the X_i, the march keeps there what another right-hand side of the same
 matrix needs (kernels.algebra.kept_factors): KEPT numbers a block,
@@ -31,6 +32,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from hybrid.kernels.algebra.rotations import add, dot, mat_mat, mat_vec, msub, scale, vec_mat
 from hybrid.kernels.machine.compile import inner, kernel
 
 SIZE = 5  # unknowns of a block
@@ -58,6 +60,19 @@ class NarrowBalance(NamedTuple):
     ahead: Any
     U: Any
     b: Any
+
+
+class Condensed(NamedTuple):
+    """A cell whose tension is eliminated, dT = stiffness (d.(dr_i - dr_{i-1}) - gap), and what is known of its start.
+
+    dr_{i-1} = g + (1 - V) dr_i
+    """
+
+    d: Any
+    stiffness: float
+    gap: float
+    V: Any
+    g: Any
 
 
 @inner
@@ -313,6 +328,55 @@ def eliminate_narrow(length, node, X, i, kept, size):
 
 
 @inner
+def answer_of_node(X):
+    """V and g of a node whose X_i begins X: dr_i = g + (1 - V) dr_{i+1}, where that is all it answers to."""
+    p, q, s = SPAN, 2 * SPAN, 3 * SPAN
+    V = (1.0 + X[p + 1], X[p + 2], X[p + 3], X[q + 1], 1.0 + X[q + 2], X[q + 3], X[s + 1], X[s + 2], 1.0 + X[s + 3])
+    return V, (X[p + 8], X[q + 8], X[s + 8])
+
+
+@inner
+def eliminate_condensed(cell, L, U, D, F, X):
+    """Eliminate a node between two cells whose tensions are eliminated; whether it is regular, its V and g (`Condensed`).
+
+    Its balance is  L dr_{i-1} + (D - L - U) dr_i + U dr_{i+1} = -F  but for the gap of the cell before it; X begins with X_i.
+    With  R = L V_{i-1} - D,  what it bears but for the cell after it, (R + U) dr_i = U dr_{i+1} + ..., so that V_i is
+    (R + U)^-1 R.  Nothing stiff is subtracted from anything stiff.
+    """
+    d, k, gap, V, g = cell
+    R = msub(mat_mat(L, V), D)
+    h = add(add(F, scale(k * gap, d)), mat_vec(L, g))
+    B0 = (R[0] + U[0], R[1] + U[1], R[2] + U[2], R[0], R[1], R[2], h[0])
+    B1 = (R[3] + U[3], R[4] + U[4], R[5] + U[5], R[3], R[4], R[5], h[1])
+    B2 = (R[6] + U[6], R[7] + U[7], R[8] + U[8], R[6], R[7], R[8], h[2])
+    if abs(B1[0]) > abs(B0[0]):
+        B0, B1 = B1, B0
+    if abs(B2[0]) > abs(B0[0]):
+        B0, B2 = B2, B0
+    f = 1.0 / B0[0]
+    C0 = (f * B0[1], f * B0[2], f * B0[3], f * B0[4], f * B0[5], f * B0[6])
+    C1, C2 = eliminate6(B1, C0), eliminate6(B2, C0)
+    if abs(C2[0]) > abs(C1[0]):
+        C1, C2 = C2, C1
+    f = 1.0 / C1[0]
+    D1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5])
+    D0, D2 = eliminate5(C0, D1), eliminate5(C2, D1)
+    f = 1.0 / D2[0]
+    E2 = (f * D2[1], f * D2[2], f * D2[3], f * D2[4])
+    E0, E1 = eliminate4(D0, E2), eliminate4(D1, E2)
+    w = scale(k, vec_mat(d, V))
+    Y = (E0[0] - 1.0, E0[1], E0[2], E1[0], E1[1] - 1.0, E1[2], E2[0], E2[1], E2[2] - 1.0)
+    back = vec_mat(w, Y)
+    g1 = (E0[3], E1[3], E2[3])
+    tension = dot(w, g1) - k * (dot(d, g) + gap)
+    big = store_row(X, 0, (0.0, back[0], back[1], back[2], tension))
+    big += store_row(X, SPAN, (0.0, Y[0], Y[1], Y[2], g1[0]))
+    big += store_row(X, 2 * SPAN, (0.0, Y[3], Y[4], Y[5], g1[1]))
+    big += store_row(X, 3 * SPAN, (0.0, Y[6], Y[7], Y[8], g1[2]))
+    return big < math.inf, (E0[0], E0[1], E0[2], E1[0], E1[1], E1[2], E2[0], E2[1], E2[2]), g1
+
+
+@inner
 def eliminate8(b, c):
     f = b[0]
     return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
@@ -339,6 +403,12 @@ def eliminate5(b, c):
 
 
 @inner
+def eliminate4(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3])
+
+
+@inner
 def store_row(X, x, row):
     X[x], X[x + 1], X[x + 2], X[x + 3] = row[0], row[1], row[2], row[3]
     X[x + 8] = row[4]
@@ -357,23 +427,34 @@ def subtract_node_rows(A, m, X, p, q, s):
     )
 
 
+@inner
+def answer(R, y, z):
+    """x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2} where X_i begins R; y = x_{i+1}, of z = x_{i+2} dr counts."""
+    return (
+        answer_row(R, 0, y, z),
+        answer_row(R, 1, y, z),
+        answer_row(R, 2, y, z),
+        answer_row(R, 3, y, z),
+        answer_row(R, 4, y, z),
+    )
+
+
+@inner
+def answer_row(R, k, y, z):
+    """What came last is taken last, and in two sums, lest all wait for it."""
+    q = SPAN * k
+    known = R[q + 8] - R[q + 5] * z[1] - R[q + 6] * z[2] - R[q + 7] * z[3] - R[q + 4] * y[4]
+    return (known - R[q] * y[0] - R[q + 1] * y[1]) - (R[q + 2] * y[2] + R[q + 3] * y[3])
+
+
 @kernel
 def substitute(X, x):
     """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
-    n = x.shape[0] - 1
-    y = (0.0, 0.0, 0.0, 0.0, 0.0)
-    z0, z1, z2 = 0.0, 0.0, 0.0
-    total = 0.0
-    for i in range(n, -1, -1):
-        p = i * ROW
-        for k in range(SIZE):
-            q = p + SPAN * k
-            x[i, k] = (
-                X[q + 8]
-                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
-                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
-            )  # fmt: skip
-            total += abs(x[i, k])
-        z0, z1, z2 = y[1], y[2], y[3]
-        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    none = (0.0, 0.0, 0.0, 0.0, 0.0)
+    y, z, total = none, none, 0.0
+    for i in range(x.shape[0] - 1, -1, -1):
+        a = answer(X[i * ROW :], y, z)
+        x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4] = a
+        total += (abs(a[0]) + abs(a[1])) + (abs(a[2]) + abs(a[3]) + abs(a[4]))
+        y, z = a, y
     return total < math.inf

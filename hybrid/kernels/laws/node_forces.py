@@ -36,7 +36,7 @@ from hybrid.kernels.laws.water import (
     wetted,
     wetted_stretch,
 )
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.state.report import (
     ADDED_MASS,
     ADDED_MASS_POWER,
@@ -58,6 +58,7 @@ from hybrid.kernels.state.report import (
 )
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
+TOUCHING = VORTICES | SEABED | OBSTACLES
 Z3 = (0.0, 0.0, 0.0)
 Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 UP = (0.0, 0.0, 1.0)
@@ -260,35 +261,44 @@ def seabed_forces(line, sea, i, x, u, v, state, cv, report):
 
 
 @inner
+def weight_and_inertia(line, i, vi, vdi, rates, report):
+    """Weight, inertia and damping by mass of node i: force, and its derivative by the position, the same in all directions."""
+    m, (cv, ca) = line.mass[i], rates
+    F, c = sub(get3(line.force, i), scale(m, vdi)), -ca * m
+    if line.bits & MASS_DAMPING:
+        b = line.damp[i]
+        F, c = sub(F, scale(b, vi)), c - cv * b
+        report[MASS_DAMPING_POWER] += b * dot(vi, vi)
+    return F, c
+
+
+@inner
+def water_at(line, sea, i, z, vi, vdi):
+    """The water at node i at height z, which moves with vi and vdi."""
+    bits, eta = line.bits, sea.surface
+    U1, w, b, af = Z3, vi, vdi, Z3
+    if bits & FLOW:
+        U, U1 = current_at(sea.z, sea.current, sea.now[1], z)
+        w = sub(w, U)
+    if bits & WAVES:
+        w, af = sub(w, get3(sea.flow, i)), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
+        b = sub(b, af)
+        eta += sea.flow[i, 6]
+    return Water(z, eta, w, U1, b, af)
+
+
+@inner
 def inertia_and_water(line, sea, i, z, vi, vdi, before, after, rates, report):
     """Weight, inertia, damping and water on node i at height z: F, and its derivatives D (dr_i), GL, GR (chords).
 
     before, after: the chords beside the node.
     """
-    m, (cv, ca) = line.mass[i], rates
-    F = sub(get3(line.force, i), scale(m, vdi))
-    c = -ca * m
+    bits = line.bits
+    F, c = weight_and_inertia(line, i, vi, vdi, rates, report)
     D = (c, 0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, c)
     GL, GR = Z9, Z9
-    bits = line.bits
-    if bits & MASS_DAMPING:
-        b = line.damp[i]
-        F = sub(F, scale(b, vi))
-        c = -cv * b
-        D = (D[0] + c, D[1], D[2], D[3], D[4] + c, D[5], D[6], D[7], D[8] + c)
-        report[MASS_DAMPING_POWER] += b * dot(vi, vi)
     if bits & WATER:
-        eta = sea.surface
-        U, U1 = Z3, Z3
-        w, b, af = vi, vdi, Z3
-        if bits & FLOW:
-            U, U1 = current_at(sea.z, sea.current, sea.now[1], z)
-            w = sub(w, U)
-        if bits & WAVES:
-            w, af = sub(w, get3(sea.flow, i)), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
-            b = sub(b, af)
-            eta += sea.flow[i, 6]
-        water = Water(z, eta, w, U1, b, af)
+        water = water_at(line, sea, i, z, vi, vdi)
         if i > 0:
             f, Df, GL = half_cell_water(line, i - 1, -1.0, water, vi, before, rates, report)
             F, D = add(F, f), madd(D, Df)
@@ -304,24 +314,35 @@ def inertia_and_water(line, sea, i, z, vi, vdi, before, after, rates, report):
     return F, D, GL, GR
 
 
+@called
+def touching_loads(line, sea, i, r, u, state, before, after, cv, report):
+    """Lift by vortices on node i, force of bed and obstacles: whether there is any, F, and derivatives as of `node_loads`."""
+    any_of_them, F, D, GL, GR = False, Z3, Z9, Z9, Z9
+    x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
+    if line.bits & VORTICES:
+        any_of_them = True
+        F, D, GL, GR = lift_at(line, sea, i, x[2], state, before, after, cv, report)
+    if line.bits & SEABED:
+        touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, state.v, state, cv, report)
+        if touches:
+            any_of_them = True
+            F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
+    if line.bits & OBSTACLES:
+        touches, f, Df, L, R = obstacle_forces(line, sea, i, x, u, state.v, state.e, cv)
+        if touches:
+            any_of_them = True
+            F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
+    return any_of_them, F, D, GL, GR
+
+
 @kernel  # called for every node, not inlined in each of the loops that do
 def node_loads(line, sea, i, r, u, state, before, after, rates, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
-    v, cv = state.v, rates.cv
     F, D, GL, GR = inertia_and_water(
-        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(state.vd, i), before, after, rates, report
+        line, sea, i, r[i, 2] + u[i, 2], get3(state.v, i), get3(state.vd, i), before, after, rates, report
     )
-    if line.bits & VORTICES:
-        f, Df, L, R = lift_at(line, sea, i, r[i, 2] + u[i, 2], state, before, after, cv, report)
-        F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
-    if line.bits & SEABED:
-        x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
-        touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state, cv, report)
-        if touches:
-            F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
-    if line.bits & OBSTACLES:
-        x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
-        touches, f, Df, L, R = obstacle_forces(line, sea, i, x, u, v, state.e, cv)
+    if line.bits & TOUCHING:
+        touches, f, Df, L, R = touching_loads(line, sea, i, r, u, state, before, after, rates.cv, report)
         if touches:
             F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     return F, D, GL, GR

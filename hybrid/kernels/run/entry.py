@@ -17,6 +17,7 @@ from hybrid.kernels.algebra.plane import WIDE
 from hybrid.kernels.laws.tension_torque import COUPLES
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.march import LANES, ROWS
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run.newton import solve
@@ -163,6 +164,7 @@ def workspace(n_cells: int, keep: bool = False) -> Work:
         rows=np.zeros((0, SIZE * WIDTH)),
         torsion=no_torsion(),
         couple=np.zeros((0, COUPLES)),
+        lanes=np.zeros(ROWS * LANES),
     )
 
 

@@ -453,6 +453,7 @@ class Work(NamedTuple):
     couple: (
         Floats  # (N+1, COUPLES) of elements where tension makes a torque (kernels.laws.tension_torque); empty: nowhere
     )
+    lanes: Floats  # what kernels.march.march needs for some nodes at a time
 
 
 def no_torsion() -> Torsion:
@@ -571,7 +572,7 @@ NO_MOVES = no_moves(0)
 def no_work() -> Work:
     """A workspace in which nothing can be solved."""
     z = np.zeros
-    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)), no_torsion(), z((0, 1)))
+    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)), no_torsion(), z((0, 1)), z(1))
 
 
 for _each in (blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no_work()):
