@@ -47,7 +47,6 @@ from hybrid.kernels.algebra.rotations import (
 from hybrid.kernels.laws.element import Chord, Rates, chord, pull, stretch
 from hybrid.kernels.laws.node_forces import (
     TOUCHING,
-    WATER,
     Z3,
     Z9,
     node_loads,
@@ -105,7 +104,7 @@ from hybrid.kernels.state.report import (
 
 LANES = 8  # nodes that are assembled at a time: two vectors of four float64
 # What the line may have: forces with a place here, and what is no force on such a node.  All else is assembled by node.
-FORCES = WATER | FLOW | MASS_DAMPING | TOUCHING | SOIL
+FORCES = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES | FLOW | MASS_DAMPING | TOUCHING | SOIL
 NO_FORCES = FRICTION | BREAKOUT | ROTARY | BENDING_LAW | BENDING_SLIP
 KNOWN = FORCES | NO_FORCES | SELF_CONTACT | SELF_FRICTION | MAY_TOUCH | MAY_MEET
 # Rows of Work.lanes.  In, of each cell beside the node, from BEFORE or AFTER on:
