@@ -6,7 +6,8 @@ what they cost.  They are assembled LANES at a time, in loops of vector instruct
 has found: most of what a catenary line costs is the assembly of its balances.  Laws are those of a node by itself
 (kernels.laws.node_forces); contact and vortices are added node by node, and nodes with a body or with a cell that passes
 through the surface are assembled so.  Work.lanes holds rows of LANES numbers: one array and constant places, by which
-the compiler sees that no row is another.  Tensions of cells that are soft enough are eliminated before the march.
+the compiler sees that no row is another.  Tensions of cells that are soft enough are eliminated before the
+march, but for equilibria: lines that are slack were refused there (two of 116 random networks).
 
 A correction changes positions, chords, tensions, directors and rates.  `plane` is the plane of a line that is computed
 in one, else None; `space` is None for such a line, else 1.  numba drops what stands behind `is not None` of the one
@@ -102,6 +103,7 @@ from hybrid.kernels.state.report import (
     WAVES,
 )
 
+AT_REST = 1e30  # 1/s2, ca of a solve for accelerations is larger (solve.stepper.HEAVY), and cv is 0 there as at rest
 LANES = 8  # nodes that are assembled at a time: two vectors of four float64
 # What the line may have: forces with a place here, and what is no force on such a node.  All else is assembled by node.
 FORCES = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES | FLOW | MASS_DAMPING | TOUCHING | SOIL
@@ -419,6 +421,7 @@ def march_catenaries(line, sea, r, state, i, cv, ca, work, kept, next_kept):
     worst, where = report[RESIDUAL], report[RESIDUAL_NODE]
     before, _, _, hck, gap = catenary_cell(line, state, i - 1, gaps)
     d, l, beyond, good, stiff, g, V = before.d, 0, i, True, 0.0, Z3, Z9
+    moves = cv > 0.0 or ca >= AT_REST  # at rest all tensions stay unknowns: what is slack hardly resists
     while beyond < n and not is_bent(line, beyond):
         beyond += 1
     while good and i < beyond:
@@ -429,7 +432,7 @@ def march_catenaries(line, sea, r, state, i, cv, ca, work, kept, next_kept):
         if not big <= worst:
             worst, where = big, float(i)
         at = (i - 1) * ROW  # a view from the block before on: numba need not ask whether indices are negative
-        stiff_after = number(lanes, STIFF_AFTER, l) if kept == 0 and i < beyond - 1 else 0.0
+        stiff_after = number(lanes, STIFF_AFTER, l) if moves and kept == 0 and i < beyond - 1 else 0.0
         if stiff > 0.0 and stiff_after > 0.0 and number(lanes, STIFF_BEFORE, l) > 0.0:
             L, U, D = matrix9(lanes, BY_NODE_BEFORE, l), matrix9(lanes, BY_NODE_AFTER, l), matrix9(lanes, BY_PLACE, l)
             cell, F = Condensed(d, stiff, gap, V, g), vector3(lanes, CONDENSED, l)

@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, caller_of_six, reader
+from hybrid.kernels.march.march import AT_REST
 from hybrid.kernels.march.zone_torque import BEFORE_MARCH, CORRECT
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FRICTION, SELF_CONTACT_ENERGY
@@ -204,8 +205,6 @@ call_quantities = caller(0)
 call_torque = caller_of_six(0)
 call_law = caller_of_six(0)
 call_slip = caller_of_six(0)
-# ca, 1/s2, of a solve for accelerations is larger (solve.stepper.HEAVY): mean tensions stay as they are.
-AT_REST = 1e30
 
 
 @inner
