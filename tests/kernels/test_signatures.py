@@ -78,12 +78,15 @@ hybrid.run(scene(environment=bed, model="catenary", output={"errors": True}))
 
 
 def too_many(found: dict[str, list[str]]) -> dict[str, list[str]]:
-    """Functions with more than one signature; those told first for which kind of line they are have one for each."""
+    """Functions with more than one signature; those told first for which kind of line they are have one for each.
+
+    One that takes joined lines in place of a line has one more.
+    """
 
     def kinds(name: str) -> int:
         room, function = name.rsplit(".", 1)
-        first = next(iter(signature(getattr(import_module(room), function).py_func).parameters), "")
-        return 2 if first in ("plane", "space") else 1
+        takes = [*signature(getattr(import_module(room), function).py_func).parameters]
+        return (2 if takes and takes[0] in ("plane", "space") else 1) + ({"line", "lines"} <= {*takes})
 
     return {name: x for name, x in found.items() if len(x) > 1 and len(x) > kinds(name)}
 

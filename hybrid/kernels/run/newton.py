@@ -95,7 +95,7 @@ def damped_part(part, turn, rub, s, it):
 
 
 @inner
-def iterate(line, lines, task, s):
+def iterate(plane, space, line, lines, task, s):
     """Newton's iterations of a line by itself, or else of lines that are joined; what is not solved is None.
 
     Returns outcome, iterations, predicted next correction, line and cell, and whether the last iteration is cut short.
@@ -105,7 +105,7 @@ def iterate(line, lines, task, s):
     while it < task.limits.most and outcome == NOT_CONVERGED:
         it += 1
         if line is not None:
-            found, worst, where = correct_line(line, task, s, where)
+            found, worst, where = correct_line(plane, space, line, task, s, where)
         if lines is not None:
             found, worst, where = correct_lines(lines, task, s, it)
         if found != OPEN:
@@ -113,7 +113,7 @@ def iterate(line, lines, task, s):
             break
         if line is not None:
             part, size, worst, where = part_of_line(line, task, s, it)
-            move_line(line, task, s, part)
+            move_line(plane, space, line, task, s, part)
         if lines is not None:
             part, size, worst, where = part_of_lines(lines, task, s, it)
             easier = move_lines(lines, task, s, part)
@@ -133,19 +133,13 @@ def iterate(line, lines, task, s):
 
 
 @inner
-def correct_line(of, task, s, where):
+def correct_line(plane, space, of, task, s, where):
     """One march and the solution of its equations with all borders, into work.x.
 
     where: the cell or node that was worst.  Returns OPEN, or the outcome with which the solution ends here, the line, and
     the cell or node where it fails; else `where`.
     """
-    plane, space, job, states, _ = of
-    return find_correction(plane, space, task, job, states, s, where)
-
-
-@inner
-def find_correction(plane, space, task, job, states, s, where):
-    """The same for one kind of line."""
+    job, states, _ = of
     line, work, new, bad, good = job.line, job.work, states.new, -1, True
     before_march(space, job, states, s, task.what)
     if space is not None:
@@ -174,7 +168,7 @@ def find_correction(plane, space, task, job, states, s, where):
 @inner
 def part_of_line(of, task, s, it):
     """The part of the correction that is made, its size, and its cell."""
-    _, _, job, states, noise = of
+    job, states, noise = of
     limits = task.limits
     shift, turn, where, pull, big = measure(states.new.e, states.new.T, job.work.x)
     part = 1.0
@@ -185,9 +179,9 @@ def part_of_line(of, task, s, it):
 
 
 @inner
-def move_line(of, task, s, part):
+def move_line(plane, space, of, task, s, part):
     """Move the line by a part of its correction."""
-    plane, space, job, states, _ = of
+    job, states, _ = of
     update(plane, space, job.line, states.new, s.cv, s.ca, part, task.turning, job.work)
 
 
@@ -213,8 +207,8 @@ def solve(plane, space, task, job, states):
         far, turn, where = begin_line_step(plane, space, job, states, s, safe)
         if far:
             return TURNED_TOO_FAR, 0, turn, where
-    of = (plane, space, job, states, round_off_tension(line, s.ca, task.limits.scale))
-    outcome, it, left, _, where, cut_short = iterate(of, None, task, s)
+    of = (job, states, round_off_tension(line, s.ca, task.limits.scale))
+    outcome, it, left, _, where, cut_short = iterate(plane, space, of, None, task, s)
     if task.what == STEP:
         find_rates(space, line, job.sea, states.old, new, work.u, s)
     if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
@@ -309,7 +303,7 @@ def solve_network(table):
         start_here(network.old, network.work)
     of = (network, give_scheme(network, task, s))
     ask(network, FORGET)
-    outcome, it, left, line, where, cut_short = iterate(None, of, task, s)
+    outcome, it, left, line, where, cut_short = iterate(None, 1, None, of, task, s)
     if task.what == STEP or task.what == EQUILIBRIUM:
         ask(network, CARRY)
         carry_lines(tables, s, task.what)
