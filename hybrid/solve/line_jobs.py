@@ -22,7 +22,7 @@ from hybrid.kernels.run.newton import solve_network
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
-from hybrid.kernels.step.line_step import ASSEMBLY, RUN, Limits, Task, blank_job
+from hybrid.kernels.step.line_step import ASSEMBLY, RUN, TOLERANCE, Limits, Task, blank_job
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.borders import (
     JointJobs,
@@ -119,10 +119,13 @@ class LineJobs:
         self._group()
 
     def _keeps(self, number: int, x: JoinedLine) -> bool:
-        """Whether all factors of a line may serve again: for contact, bodies, sheaves and winches."""
+        """Whether all factors of a line may serve again: for contact, bodies, sheaves, winches, and tangents.
+
+        These are of steps that are solved to round-off, and are held against others: all must round alike.
+        """
         beside = bool(self._rides.size or self._sheaves or self._winches)
         mixes = beside and (self._mixes[number] or self._near[number] == JOINED)
-        return x.winds or mixes or number in self._touching_lines
+        return x.winds or mixes or number in self._touching_lines or self.tolerance < TOLERANCE
 
     @property
     def _touching_lines(self) -> set[int]:

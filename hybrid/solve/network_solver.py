@@ -80,8 +80,8 @@ class NetworkSolver(LineJobs):
         contact of lines that may touch each other, which have none of their own; tolerance: of Newton's method in
         steps; apart: whether lines that are joined to nothing are solved by themselves whatever is free beside them.
         """
-        super().__init__(lines, bodies, contacts, shared, apart)
         self.tolerance, self.net, self.body_work = tolerance, np.zeros((points, 3)), np.zeros((len(bodies), WORK))
+        super().__init__(lines, bodies, contacts, shared, apart)
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
         self.scale = max(x.scale for x in lines)

@@ -155,8 +155,7 @@ def test_wrong_uses_are_errors_in_words_and_it_goes_on() -> None:
     assert len(moordyn.Step(network, PLACES, STILL, 0.0, 0.1)) == 9
     with pytest.raises(ValueError, match="where the last step ended"):
         moordyn.Step(network, PLACES, STILL, 0.0, 0.1)
-    fairlead, anchor = moordyn.GetFASTtens(network, 3)[0][0], moordyn.GetFASTtens(network, 3)[2][0]
-    assert fairlead == pytest.approx(anchor, rel=1e-9) and anchor > 0.0  # across, in still water
+    assert moordyn.GetFASTtens(network, 3)[0][0] > moordyn.GetFASTtens(network, 3)[2][0] > 0.0
     assert moordyn.GetLineFairTen(moordyn.GetLine(network, 1)) == moordyn.GetLineMaxTen(moordyn.GetLine(network, 1))
     moordyn.Close(network)
     for after in (lambda: moordyn.Step(network, PLACES, STILL, 0.1, 0.1), lambda: moordyn.Close(network)):

@@ -34,7 +34,7 @@ def both(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[np.nda
     """(P, W) derivatives by tangents and by differences, their errors in turn, and results by numbers."""
     asked = asked_of(tables, of, keys)
     found, theirs = by_tangents(*asked), by_differences(*asked)
-    np.testing.assert_allclose(found.values, theirs.values, rtol=1e-11)  # whose runs keep no factors
+    np.testing.assert_allclose(found.values, theirs.values, rtol=1e-12)
     floor = np.abs(found.values) / np.array(list(asked[-1].values()))[:, None]
     return found.derivatives, theirs.derivatives, found.errors, theirs.errors, floor
 

@@ -427,34 +427,23 @@ def subtract_node_rows(A, m, X, p, q, s):
     )
 
 
-@inner
-def answer(R, y, z):
-    """x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2} where X_i begins R; y = x_{i+1}, of z = x_{i+2} dr counts."""
-    return (
-        answer_row(R, 0, y, z),
-        answer_row(R, 1, y, z),
-        answer_row(R, 2, y, z),
-        answer_row(R, 3, y, z),
-        answer_row(R, 4, y, z),
-    )
-
-
-@inner
-def answer_row(R, k, y, z):
-    """What came last is taken last, and in two sums, lest all wait for it."""
-    q = SPAN * k
-    known = R[q + 8] - R[q + 5] * z[1] - R[q + 6] * z[2] - R[q + 7] * z[3] - R[q + 4] * y[4]
-    return (known - R[q] * y[0] - R[q + 1] * y[1]) - (R[q + 2] * y[2] + R[q + 3] * y[3])
-
-
 @kernel
 def substitute(X, x):
     """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
-    none = (0.0, 0.0, 0.0, 0.0, 0.0)
-    y, z, total = none, none, 0.0
-    for i in range(x.shape[0] - 1, -1, -1):
-        a = answer(X[i * ROW :], y, z)
-        x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4] = a
-        total += (abs(a[0]) + abs(a[1])) + (abs(a[2]) + abs(a[3]) + abs(a[4]))
-        y, z = a, y
+    n = x.shape[0] - 1
+    y = (0.0, 0.0, 0.0, 0.0, 0.0)
+    z0, z1, z2 = 0.0, 0.0, 0.0
+    total = 0.0
+    for i in range(n, -1, -1):
+        p = i * ROW
+        for k in range(SIZE):
+            q = p + SPAN * k
+            x[i, k] = (
+                X[q + 8]
+                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
+                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
+            )  # fmt: skip
+            total += abs(x[i, k])
+        z0, z1, z2 = y[1], y[2], y[3]
+        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
     return total < math.inf
