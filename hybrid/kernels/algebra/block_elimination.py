@@ -336,19 +336,11 @@ def answer_of_node(X):
 
 
 @inner
-def eliminate_condensed(cell, L, U, D, F, X):
-    """Eliminate a node between two cells whose tensions are eliminated; whether it is regular, its V and g (`Condensed`).
+def solve_three(B0, B1, B2):
+    """Solve three equations by Gauss-Jordan with pivoting by rows: rows of 3 unknowns and 4 right-hand sides.
 
-    Its balance is  L dr_{i-1} + (D - L - U) dr_i + U dr_{i+1} = -F  but for the gap of the cell before it; X begins with X_i.
-    With  R = L V_{i-1} - D,  what it bears but for the cell after it, (R + U) dr_i = U dr_{i+1} + ..., so that V_i is
-    (R + U)^-1 R.  Nothing stiff is subtracted from anything stiff.
+    A pivot of zero makes everything infinite or NaN.
     """
-    d, k, gap, V, g = cell
-    R = msub(mat_mat(L, V), D)
-    h = add(add(F, scale(k * gap, d)), mat_vec(L, g))
-    B0 = (R[0] + U[0], R[1] + U[1], R[2] + U[2], R[0], R[1], R[2], h[0])
-    B1 = (R[3] + U[3], R[4] + U[4], R[5] + U[5], R[3], R[4], R[5], h[1])
-    B2 = (R[6] + U[6], R[7] + U[7], R[8] + U[8], R[6], R[7], R[8], h[2])
     if abs(B1[0]) > abs(B0[0]):
         B0, B1 = B1, B0
     if abs(B2[0]) > abs(B0[0]):
@@ -364,6 +356,24 @@ def eliminate_condensed(cell, L, U, D, F, X):
     f = 1.0 / D2[0]
     E2 = (f * D2[1], f * D2[2], f * D2[3], f * D2[4])
     E0, E1 = eliminate4(D0, E2), eliminate4(D1, E2)
+    return E0, E1, E2
+
+
+@inner
+def eliminate_condensed(cell, L, U, D, F, X):
+    """Eliminate a node between two cells whose tensions are eliminated; whether it is regular, its V and g (`Condensed`).
+
+    Its balance is  L dr_{i-1} + (D - L - U) dr_i + U dr_{i+1} = -F  but for the gap of the cell before it; X begins with X_i.
+    With  R = L V_{i-1} - D,  what it bears but for the cell after it, (R + U) dr_i = U dr_{i+1} + ..., so that V_i is
+    (R + U)^-1 R.  Nothing stiff is subtracted from anything stiff.
+    """
+    d, k, gap, V, g = cell
+    R = msub(mat_mat(L, V), D)
+    h = add(add(F, scale(k * gap, d)), mat_vec(L, g))
+    B0 = (R[0] + U[0], R[1] + U[1], R[2] + U[2], R[0], R[1], R[2], h[0])
+    B1 = (R[3] + U[3], R[4] + U[4], R[5] + U[5], R[3], R[4], R[5], h[1])
+    B2 = (R[6] + U[6], R[7] + U[7], R[8] + U[8], R[6], R[7], R[8], h[2])
+    E0, E1, E2 = solve_three(B0, B1, B2)
     w = scale(k, vec_mat(d, V))
     Y = (E0[0] - 1.0, E0[1], E0[2], E1[0], E1[1] - 1.0, E1[2], E2[0], E2[1], E2[2] - 1.0)
     back = vec_mat(w, Y)

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.block_elimination import eliminate5, eliminate6, eliminate7, eliminate8
+from hybrid.kernels.algebra.block_elimination import eliminate6, eliminate7, eliminate8, solve_three
 from hybrid.kernels.machine.compile import inner, kernel
 
 
@@ -348,23 +348,7 @@ def eliminate_chain(length, node, X, i, kept):
     G0 = (B0[0], B0[1], B0[2], 0.0, 0.0, 0.0, B0[3])
     G1 = (B1[0], B1[1], B1[2], ahead[0], U[0], U[1], B1[3])
     G2 = (B2[0], B2[1], B2[2], ahead[1], U[2], U[3], B2[3])
-    if abs(G1[0]) > abs(G0[0]):
-        G0, G1 = G1, G0
-    if abs(G2[0]) > abs(G0[0]):
-        G0, G2 = G2, G0
-    f = 1.0 / G0[0]
-    C0 = (f * G0[1], f * G0[2], f * G0[3], f * G0[4], f * G0[5], f * G0[6])
-    C1, C2 = eliminate6(G1, C0), eliminate6(G2, C0)
-    if abs(C2[0]) > abs(C1[0]):
-        C1, C2 = C2, C1
-    f = 1.0 / C1[0]
-    E1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5])
-    E0, E2 = eliminate5(C0, E1), eliminate5(C2, E1)
-    f = 1.0 / E2[0]
-    F2 = (f * E2[1], f * E2[2], f * E2[3], f * E2[4])
-    a, c = E0[0], E1[0]
-    F0 = (E0[1] - a * F2[0], E0[2] - a * F2[1], E0[3] - a * F2[2], E0[4] - a * F2[3])
-    F1 = (E1[1] - c * F2[0], E1[2] - c * F2[1], E1[3] - c * F2[2], E1[4] - c * F2[3])
+    F0, F1, F2 = solve_three(G0, G1, G2)
     o = i * TRIPLE
     for F in (F0, F1, F2):
         X[o], X[o + 1], X[o + 2], X[o + 3], X[o + 4], X[o + 5] = F[0], F[1], F[2], 0.0, 0.0, F[3]
