@@ -4,7 +4,7 @@
     python bench/kernel_sizes.py run.in_space        and, of each that is named, the functions that are copied most
 
 A size is a number of nodes of Python's syntax tree.  `own` counts each function once, `inlined` as often as @inner
-copies it; @kernel and @called functions are not copied.  Nothing is compiled.
+copies it; @kernel and @called functions are not copied, and @linked_kernel are no part of it.  Nothing is compiled.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections import Counter
 from pathlib import Path
 
 HYBRID = Path(__file__).parents[1] / "hybrid"
-KINDS = ("inner", "kernel", "called")
+KINDS = ("inner", "kernel", "called", "linked_kernel")
 SHOWN, COPIES = 12, 16
 Name = tuple[str, str]  # module, function
 
@@ -63,7 +63,7 @@ class Kernels:
                 if self.kind[name] == "inner":
                     found[name] += times
                     count(name, times)
-                elif name not in once:
+                elif name not in once and self.kind[name] != "linked_kernel":
                     once.add(name)
                     found[name] += 1
                     count(name, 1)

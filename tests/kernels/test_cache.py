@@ -16,6 +16,9 @@ from kernel_sizes import Kernels
 
 import hybrid
 from hybrid.kernels.machine.cache import LEVELS, compiler_hash, processor, temporary_folder
+from hybrid.kernels.machine.compile import kernel, linked_kernel
+from hybrid.kernels.machine.kept_code import KeptCode
+from hybrid.kernels.machine.references import caller, linked
 
 PACKAGE = Path(hybrid.__file__).parent
 
@@ -252,3 +255,57 @@ def test_a_temporary_cache_is_ours_alone(tmp_path: Path, monkeypatch: pytest.Mon
     name.rmdir()
     name.symlink_to(tmp_path)
     assert ask() not in (name, tmp_path)
+
+
+@linked_kernel(lambda: (0.0,), 0.0)
+def one_more(x):
+    return x + 1.0
+
+
+@kernel
+def asks_for_more(table):
+    return one_more(table[0]) if table[0] > 0.0 else -1.0
+
+
+call_one = caller(0.0)
+
+
+@kernel
+def asks_by_address(address, table):
+    return 2.0 * call_one(address, table)
+
+
+def test_a_law_that_cannot_be_compiled_ends_what_calls_it_and_nothing_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also through kernels that call each other by address; later it is compiled after all."""
+    low, high = np.array([-1.0]), np.array([1.0])
+    address, compiled = asks_for_more.address(low), linked[one_more.symbol]
+
+    def interrupted() -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(linked, one_more.symbol, interrupted)
+    assert asks_for_more(low) == -1.0
+    assert asks_by_address(address, low) == -2.0
+    with pytest.raises(KeyboardInterrupt):
+        asks_for_more(high)
+    with pytest.raises(KeyboardInterrupt):
+        asks_by_address(address, high)
+    monkeypatch.setitem(linked, one_more.symbol, compiled)
+    assert asks_for_more(high) == 2.0
+    assert asks_by_address(address, high) == 4.0
+
+
+def test_laws_that_a_scene_does_not_have_are_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: set[str] = set()
+    taking = KeptCode.taking
+    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (asked.add(self._name), taking(self, args))[1])
+    scene = {
+        "cable": {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 1}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 0]}},
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 8}, "time": {"duration": 0.2, "step": 0.1},
+    }  # fmt: skip
+    hybrid.run(scene, progress=False).close()
+    names = {x.removeprefix("hybrid.kernels.") for x in linked}
+    assert {"laws.obstacles.passes", "laws.soil.update_soil"} < names
+    assert "run.network.begin_line" in asked
+    assert not asked & names

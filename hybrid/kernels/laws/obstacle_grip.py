@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
 from hybrid.kernels.laws.obstacles import (
     carry_obstacles,
@@ -20,7 +22,7 @@ from hybrid.kernels.laws.obstacles import (
     way_with,
 )
 from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, is_far, surface
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.state.report import (
     ANGLE,
     CONTACT_WORK,
@@ -44,6 +46,7 @@ from hybrid.kernels.state.report import (
     TRAVEL,
     TURNED,
 )
+from hybrid.kernels.state.state import ROWS, blank_state, in_sea, no_sea
 
 
 @inner
@@ -68,7 +71,7 @@ def pressed(line, sea, k, i, x, state):
     return N, n, curved
 
 
-@kernel
+@linked_kernel(in_sea(blank_state(1), 0), 0.0)
 def pressure_of_obstacles(line, sea, state, i):
     """Force per length (N/m) of all obstacles across node i, over its half cells."""
     x, F, length = get3(state.r, i), Z3, 0.0
@@ -83,7 +86,7 @@ def pressure_of_obstacles(line, sea, state, i):
     return math.sqrt(dot(F, F)) / length
 
 
-@kernel
+@linked_kernel(in_sea(ROWS, blank_state(1), ROWS, ROWS))
 def grip_obstacles(line, sea, u, state, was, now):
     """Travel and force of every obstacle on every node of a state into `now`; was: those before the step, (N+1, 6 M).
 
@@ -118,7 +121,7 @@ def normals_of_step(sea, k, x, u):
     return mat_vec(transposed(row9(sea.carried, k, SWEEP)), before), after
 
 
-@kernel
+@linked_kernel(lambda: (no_sea(1), blank_state(1), blank_state(1), ROWS, np.zeros(1)))
 def book_obstacles(sea, old, new, u, report):
     """Work of obstacles in a step: what they push by as they move, and along and across their normals beside that."""
     for i in range(u.shape[0]):
@@ -147,7 +150,7 @@ def wrench_on(state, k, place):
     return force, moment
 
 
-@kernel
+@linked_kernel(lambda: (no_sea(1), blank_state(1), blank_state(1), 0.0, 0.0, np.zeros(1), 0))
 def sample_obstacles(sea, old, new, t, x, row, at):
     """Where obstacles are at t (s), the part x of the last step, and what the line does to them there, into a row."""
     for k in range(new.sheave.shape[0]):

@@ -46,7 +46,7 @@ from hybrid.kernels.laws.end_motion import (
 )
 from hybrid.kernels.laws.seabed import bed_under, contact, depth_of, stored, with_cell
 from hybrid.kernels.laws.surfaces import E9, Z3, Z9, bent, gradient_of_normal, is_far, surface
-from hybrid.kernels.machine.compile import called, inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel, linked_kernel
 from hybrid.kernels.state.report import (
     AXIS,
     BEGAN,
@@ -96,7 +96,9 @@ from hybrid.kernels.state.report import (
     TURNED,
     TURNING,
 )
-from hybrid.kernels.state.state import Floats, Sea
+from hybrid.kernels.state.state import ROWS, Floats, Sea, in_sea, no_sea
+
+PUSH = False, Z3, Z9, Z9, Z9  # an answer of `obstacle_forces`
 
 
 @inner
@@ -162,7 +164,7 @@ def pose_at(t, k, sea, rolled):
     return x, v, R, whole, w
 
 
-@kernel
+@linked_kernel(lambda: (0.0, 0.0, no_sea(1)))
 def carry_obstacles(begin, end, sea):
     """Bring obstacles that move to where they are at `end` (s), and know where they were at `begin`.
 
@@ -335,7 +337,7 @@ def normal_force(line, sea, moves, k, i, x, v, e, cv):
     return N, N != 0.0 or DN != 0.0, n, curved, dN, L, R
 
 
-@kernel
+@linked_kernel(in_sea(0, 0, Z3, ROWS, ROWS, ROWS, 0.0), PUSH)
 def force_of_obstacle(line, sea, k, i, x, u, v, e, cv):
     """As `obstacle_forces`, of obstacle k alone, which moves: whether it touches, F, D, GL, GR."""
     N, touches, n, curved, dN, L, R = normal_force(line, sea, True, k, i, x, v, e, cv)
@@ -351,7 +353,7 @@ def force_of_obstacle(line, sea, k, i, x, u, v, e, cv):
     return touches, F, D, mscale(-1.0, outer(slope, L)), outer(slope, R)
 
 
-@kernel  # called for every node of a scene that has obstacles
+@linked_kernel(in_sea(0, Z3, ROWS, ROWS, ROWS, 0.0), PUSH)
 def obstacle_forces(line, sea, i, x, u, v, e, cv):
     """Contact and friction of obstacles at node i: whether there are any, F, D, GL, GR (chord before, after)."""
     rows = sea.obstacles
@@ -399,7 +401,7 @@ def depth_in(sea, k, r, i):
     return 0.5 * sea.obstacles[k, ONSET_OF] - d
 
 
-@kernel
+@linked_kernel(in_sea(ROWS), 0.0)
 def stored_on_obstacles(line, sea, r):
     """Energy (J) that obstacles have stored against the line."""
     rows, energy, moves = sea.obstacles, 0.0, line.moved.shape[0] > 0
@@ -472,13 +474,18 @@ def normal_at(line, sea, x, of_bed):
     """Normal at x of what is pressed on most deeply there, the bed or an obstacle; of_bed: of the bed alone."""
     n, deep = bed_under(sea, x)
     if line.bits & OBSTACLES and not of_bed:
-        if not line.bits & SEABED:
-            deep = -math.inf
-        for k in range(sea.obstacles.shape[0]):
-            d, m, _ = surface(sea, k, x)
-            p = 0.5 * sea.obstacles[k, ONSET_OF] - d
-            if p > deep:
-                n, deep = m, p
+        return normal_of_obstacles(sea, x, n, deep if line.bits & SEABED else -math.inf)
+    return n
+
+
+@linked_kernel(lambda: (no_sea(1), Z3, Z3, 0.0), Z3)
+def normal_of_obstacles(sea, x, n, deep):
+    """Normal at x of the obstacle that is pressed on most deeply there; n where none is more deeply than `deep`, m."""
+    for k in range(sea.obstacles.shape[0]):
+        d, m, _ = surface(sea, k, x)
+        p = 0.5 * sea.obstacles[k, ONSET_OF] - d
+        if p > deep:
+            n, deep = m, p
     return n
 
 
@@ -486,7 +493,7 @@ def normal_at(line, sea, x, of_bed):
 REACHED = 1e-3
 
 
-@kernel
+@linked_kernel(in_sea(ROWS, ROWS), 0)
 def passes(line, sea, r, u):
     """The first node that a step leads deeper into an obstacle than by the strand's radius, or through it; -1: none.
 

@@ -31,9 +31,9 @@ import math
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale
 from hybrid.kernels.laws.seabed import bed_under
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import BREAKOUT, FRICTION, SOIL
-from hybrid.kernels.state.state import Floats, Line, Sea
+from hybrid.kernels.state.state import ROWS, Floats, Line, Sea, blank_state, in_sea
 
 # Places of Sea.soil: su0, Pa; rho, Pa/m; a; b; K; f; whether there is lateral resistance; gamma, N/m3; J; of friction
 # r along and across, and l, m; part of the law that
@@ -158,7 +158,7 @@ def borne_length(line, i):
     return h
 
 
-@inner
+@linked_kernel(in_sea(ROWS, 0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 def soil_force(line, sea, past, i, p):
     """Of node i at p (of `bed_under`): force along the normal, N, of friction along and across at most, and their slopes."""
     z, D, h = p - 0.5 * sea.onset, line.bed_width[i], borne_length(line, i)
@@ -195,7 +195,7 @@ def depth_under(soil, D, P):
     return high
 
 
-@kernel
+@linked_kernel(in_sea(ROWS, ROWS))
 def update_soil(line, sea, r, soil):
     """What the nodes of a line at r (N+1, 3) m remember of the soil behind a step, or in an equilibrium, into soil (N+1, 6)."""
     if line.bits & SOIL:
@@ -222,7 +222,7 @@ def remember_between(soil, out, i, a, b, part):
         out[i, TURN], out[i, TURN_P] = soil[near, TURN], soil[near, TURN_P]
 
 
-@kernel
+@linked_kernel(in_sea(ROWS, ROWS))
 def lie_in_soil(line, sea, r, soil):
     """Nodes at r (N+1, 3) m have always been as deep as they are, on the branches that soil (N+1, 6) has them on.
 
@@ -245,7 +245,7 @@ def lie_in_soil(line, sea, r, soil):
             soil[i, TURN], soil[i, TURN_P], soil[i, BRANCH] = 0.0, 0.0, FIRST
 
 
-@inner
+@linked_kernel(in_sea(blank_state(1), blank_state(1), ROWS))
 def slide_on(line, sea, old, new, u):
     """The ways that nodes have slid in a step, into new.soil; none of a node that does not touch the bed."""
     for i in range(new.soil.shape[0]):

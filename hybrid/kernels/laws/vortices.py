@@ -22,6 +22,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from hybrid.kernels.algebra.rotations import (
     add,
     cross,
@@ -39,10 +41,11 @@ from hybrid.kernels.algebra.rotations import (
     sub,
 )
 from hybrid.kernels.laws.drag_law import split as split_velocity
-from hybrid.kernels.laws.element import chord
+from hybrid.kernels.laws.element import Chord, chord
 from hybrid.kernels.laws.water import current_at, wetted_stretch
-from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.report import DRAG_POWER, FLOW, SURFACE, WAVES
+from hybrid.kernels.machine.compile import inner, linked_kernel
+from hybrid.kernels.state.report import DRAG_POWER, FLOW, REPORT_SIZE, SURFACE, WAVES
+from hybrid.kernels.state.state import blank_state, in_sea
 
 # Columns of Line.wake_law: lift of the half cells before and after a node, rho/2 D Cv h/2 (kg/m); diameter (m; 0: there
 # are no vortices); frequencies; time over which the lift grows (s); phase at the start (rad).
@@ -55,6 +58,10 @@ PERIODS, USUAL = 8.0, 0.17
 STILL, LEAST = 1e-3, 0.1
 
 split = inner(split_velocity)
+
+Z3 = (0.0, 0.0, 0.0)
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+CHORD = Chord(Z3, 0.0, 0.0)
 
 
 @inner
@@ -90,7 +97,7 @@ def frequency(law, i, phase, v, a, mean_v, mean_a, speed):
     return law[i, CENTER] + S * (law[i, HIGH] - law[i, CENTER] if S > 0.0 else law[i, CENTER] - law[i, LOW])
 
 
-@kernel
+@linked_kernel(in_sea(blank_state(1), blank_state(1), 0.0))
 def advance_wake(line, sea, old, new, dt):
     """Phases and means after a step of dt (s) from `old`, into new.wake."""
     law = line.wake_law
@@ -148,12 +155,11 @@ def lift_on(line, sea, i, side, z, u, slope, c, near, cv):
     return f, D, L
 
 
-@inner
+@linked_kernel(in_sea(0, 0.0, blank_state(1), CHORD, CHORD, 0.0, np.zeros(REPORT_SIZE)), (Z3, Z9, Z9, Z9))
 def lift_at(line, sea, i, z, state, before, after, cv, report):
     """The lift on node i: F, and its derivatives D (dr_i), GL, GR (chord before, after); its work is booked with drag."""
     law, share, v = line.wake_law, state.wake[i, SHARE], get3(state.v, i)
-    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    F, D, GL, GR = (0.0, 0.0, 0.0), zero, zero, zero
+    F, D, GL, GR = Z3, Z9, Z9, Z9
     u, slope = relative_velocity(line, sea, i, z, v)
     if i > 0 and law[i, LIFT_A] > 0.0:
         F, D, GL = lift_on(line, sea, i, -1.0, z, u, slope, share * law[i, LIFT_A], before, cv)

@@ -11,6 +11,8 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any
 
+from hybrid.kernels.machine.references import linked
+
 
 class _Function:
     """A function whose dispatcher numba makes when it is needed.
@@ -105,6 +107,33 @@ class Entry(_Function):
         return self._code.compilations
 
 
+class Linked(Entry):
+    """A kernel that others call by its address: compiled by itself, when one of them first calls it."""
+
+    def __init__(self, function: Callable[..., Any], arguments: Callable[[], tuple[Any, ...]], returned: Any) -> None:
+        """arguments, returned: examples of what it takes, made where they are needed, and of what it returns."""
+        super().__init__(function)
+        self.arguments, self.returned = arguments, returned
+        self.symbol = f"{function.__module__}.{function.__qualname__}"
+        linked[self.symbol] = self.find
+
+    @cached_property
+    def _code(self) -> Any:
+        from hybrid.kernels.machine.kept_code import KeptCode
+
+        return KeptCode(self.py_func, self._inlined, (self.returned,))
+
+    @property
+    def _numba_type_(self) -> Any:
+        from hybrid.kernels.machine.reference_types import type_of_linked
+
+        return type_of_linked(self)
+
+    def find(self) -> int:
+        """The address of its machine code."""
+        return self.address(*self.arguments())
+
+
 def entry(name: str) -> Entry:
     """The kernel of a name, as room.file.function."""
     file, _, function = name.rpartition(".")
@@ -130,6 +159,14 @@ def kernel(function: Callable[..., Any] | None = None, inlined: bool = True) -> 
     inlined: False compiles in about half of the time, for kernels that do much beside what takes time.
     """
     return Entry(function, inlined) if function else lambda decorated: Entry(decorated, inlined)
+
+
+def linked_kernel(arguments: Callable[[], tuple[Any, ...]], returned: Any = None) -> Any:
+    """Compile an entry point that is no part of kernels that call it: a law that few scenes have.
+
+    It costs some nanoseconds a call, and a look whether its address is known.  arguments, returned: as of `Linked`.
+    """
+    return lambda function: Linked(function, arguments, returned)
 
 
 def inner(function: Callable[..., Any]) -> Any:

@@ -250,11 +250,15 @@ class Made(NamedTuple):
         return Code(lambda args: entry(*args), self.result.library.get_pointer_to_function(symbol))
 
 
-def compile_entry(function: Callable[..., Any], key: tuple[Any, ...], inlined: bool) -> Made:
-    """key: of the types of its arguments (kernels.machine.references); inlined: all that it calls."""
+def compile_entry(
+    function: Callable[..., Any], key: tuple[Any, ...], inlined: bool, returned: tuple[Any, ...] = ()
+) -> Made:
+    """key: of the types of its arguments (kernels.machine.references); inlined: all that it calls; returned: an example."""
     entry = _njit(pipeline_class=_EntryCompiler if inlined else _LooseCompiler, **_OPTIONS)(function)
     entry.__class__ = _Kernel
-    sig = tuple(map(reference_types.type_for, key))
+    sig: Any = tuple(map(reference_types.type_for, key))
+    if returned:
+        sig = numba.typeof(returned[0])(*sig)
     entry.compile(sig)
     (result,) = entry.overloads.values()
     return Made(result, result.library.codegen.magic_tuple())

@@ -22,7 +22,7 @@ import numpy as np
 
 from hybrid.kernels.machine import cache as kept
 from hybrid.kernels.machine.cache import SUFFIX, Unusable, digest, read_code, write_code
-from hybrid.kernels.machine.linked_code import Code, link
+from hybrid.kernels.machine.linked_code import Code, link, provide_symbols
 from hybrid.kernels.machine.references import Intrinsic, NamedNumbers, examples, is_array, key_of, text_of
 
 if TYPE_CHECKING:
@@ -99,6 +99,8 @@ def _described(value: Any, names: list[str], called: Called) -> str:
     names: of the function, of which a module's attributes are among.
     """
     of = getattr(value, "py_func", None)
+    if hasattr(value, "symbol"):  # linked: what it does is no part of its caller
+        return digest(value.symbol, *map(key_digest, map(key_of, value.arguments())), _layout(value.returned))
     if isinstance(of, FunctionType):  # of kernels.machine.compile, or of numba
         called[of] = None
         options = getattr(value, "apart", ""), getattr(value, "options", "")
@@ -159,9 +161,9 @@ def _fields(example: Any) -> str:
 class KeptCode:
     """Machine code of one entry, by the types of the arguments."""
 
-    def __init__(self, function: Callable[..., Any], inlined: bool) -> None:
-        """inlined: whether all @inner functions are inlined into it."""
-        self._function, self._inlined = function, inlined
+    def __init__(self, function: Callable[..., Any], inlined: bool, returned: tuple[Any, ...] = ()) -> None:
+        """inlined: whether all @inner functions are inlined into it; returned: an example, where its callers know one."""
+        self._function, self._inlined, self._returned = function, inlined, returned
         self._known: dict[tuple[Any, ...], Code] = {}
         self.compilations = 0
 
@@ -212,7 +214,8 @@ class KeptCode:
     def _compiled(self, key: tuple[Any, ...]) -> Code:
         from hybrid.kernels.machine.compiler import compile_entry
 
-        made = compile_entry(self._function, key, self._inlined)
+        provide_symbols()
+        made = compile_entry(self._function, key, self._inlined, self._returned)
         self.compilations += 1
         if not self._can_be_kept(made):
             return made.code_here()
@@ -271,7 +274,7 @@ class KeptCode:
 
     @cached_property
     def _source(self) -> str:
-        return digest(source_digest(self._function), str(self._inlined))
+        return digest(source_digest(self._function), str(self._inlined), *map(_layout, self._returned))
 
     def _header(self, place: kept.Place, key: tuple[Any, ...]) -> dict[str, Any]:
         """What the file for a signature says of what it is."""

@@ -6,6 +6,7 @@ The layout of a table is that of kernels.machine.binding.
 from __future__ import annotations
 
 from functools import cache
+from inspect import Parameter, Signature, signature
 from types import NoneType
 from typing import Any
 
@@ -140,8 +141,52 @@ def _type_of_intrinsic(of: Intrinsic, _: Any) -> Any:
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kinds = signature.args[1:]
     code = context.call_conv.get_function_type(signature.return_type, kinds).as_pointer()
-    called = builder.inttoptr(args[0], code)
-    return context.call_conv.call_function(builder, called, signature.return_type, kinds, args[1:])[1]
+    return _answer(context, builder, builder.inttoptr(args[0], code), signature.return_type, kinds, args[1:])
+
+
+def _answer(context: Any, builder: Any, called: Any, returned: Any, kinds: Any, args: Any) -> Any:
+    """What a kernel returns.  One fails where it calls another that cannot be compiled, and its caller with it."""
+    status, found = context.call_conv.call_function(builder, called, returned, kinds, args)
+    with cgutils.if_unlikely(builder, status.is_error):
+        context.call_conv.return_status_propagate(builder, status)
+    return found
+
+
+@cache
+def type_of_linked(of: Any) -> Any:
+    """The type of a kernels.machine.compile.Linked.
+
+    Its address stands in a variable of its name, 0 until it is asked for: kernels.machine.linked_code.
+    """
+    return types.Function(make_intrinsic_template(of, _linked_function(of), of.symbol))
+
+
+def _linked_function(of: Any) -> Any:
+    """What numba is told of a linked kernel."""
+    returned, kinds = typeof(of.returned), tuple(map(type_of, of.arguments()))
+
+    def call(typingctx: Any, *args: Any) -> Any:
+        return returned(*kinds), generate
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        code = context.call_conv.get_function_type(returned, kinds).as_pointer()
+        called = builder.inttoptr(_linked_address(builder, of.symbol), code)
+        return _answer(context, builder, called, returned, kinds, args)
+
+    names = ["typingctx", *signature(of.py_func).parameters]
+    call.__signature__ = Signature([Parameter(x, Parameter.POSITIONAL_ONLY) for x in names])  # type: ignore[attr-defined]
+    return call
+
+
+def _linked_address(builder: Any, symbol: str) -> Any:
+    """The address of a linked kernel, asked for where it is not known."""
+    known = builder.module.globals.get(f"{symbol}.address")
+    variable = known or ir.GlobalVariable(builder.module, _WORD, f"{symbol}.address")
+    place = cgutils.alloca_once_value(builder, builder.load(variable))
+    with cgutils.if_unlikely(builder, builder.icmp_signed("==", builder.load(place), _WORD(0))):
+        find = cgutils.get_or_insert_function(builder.module, ir.FunctionType(_WORD, []), f"{symbol}.find")
+        builder.store(builder.call(find, []), place)
+    return builder.load(place)
 
 
 @register_model(Reference)

@@ -13,6 +13,7 @@ Types of the arguments of an entry are keys of a table, and text.  numba has its
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from operator import itemgetter
 from typing import Any, ClassVar, Self
@@ -21,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 examples: dict[type, Any] = {}  # of the classes that are kept by reference
+# What finds the addresses of kernels that others call when they first do (kernels.machine.compile.Linked), by their names.
+linked: dict[str, Callable[[], int]] = {}
 
 
 def by_reference(example: Any) -> None:

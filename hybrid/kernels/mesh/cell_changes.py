@@ -33,7 +33,7 @@ from hybrid.kernels.mesh.zone_criteria import shares, soften
 from hybrid.kernels.mesh.zone_step import ZoneClock, ZoneFlags, Zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, carry_push, old_cell, put3, transfer_state
 from hybrid.kernels.state.books import Books, Clock
-from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, PLANAR, SEABED_ENERGY, TOUCHES, WAVES
+from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, PLANAR, SEABED_ENERGY, SOIL, TOUCHES, WAVES
 from hybrid.kernels.state.state import Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blanks
 from hybrid.kernels.step.line_step import read
 from hybrid.kernels.step.step import friction_axes
@@ -295,7 +295,8 @@ def before_forces(table):
         wave_kinematics(job.sea, job.old.r, job.work.u)
     if job.line.bits & FRICTION:
         friction_axes(job.sea, job.old.r, job.old.e, job.old.slip, job.old.grip)
-    lie_in_soil(job.line, job.sea, job.old.r, job.old.soil)
+    if job.line.bits & SOIL:
+        lie_in_soil(job.line, job.sea, job.old.r, job.old.soil)
 
 
 @kernel

@@ -19,7 +19,7 @@ from hybrid.kernels.laws.end_motion import end_turn
 from hybrid.kernels.laws.obstacles import surface_velocity
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.machine.references import NamedNumbers, by_reference, caller, reader
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.mesh.cell_errors import (
@@ -62,7 +62,7 @@ from hybrid.kernels.mesh.zone_criteria import (
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.report import OBSTACLES, STRAND
-from hybrid.kernels.state.state import Ends, Floats, Line, Rows, Sea, State, blanks
+from hybrid.kernels.state.state import Ends, Floats, Line, Rows, Sea, State, blank_state, blanks, in_sea
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
 LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
@@ -275,7 +275,7 @@ def weigh_contact(near, zones):
         raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], near[i])
 
 
-@inner
+@linked_kernel(in_sea(blank_state(1), blank_zones(1, 1), 0.0))
 def weigh_obstacles(line, sea, state, zones, horizon):
     """What is near an obstacle, or will be within a horizon, s, as what is near the line itself."""
     rows, of, last = sea.obstacles, zones.kinds.base_of_cell, zones.kinds.base_of_cell.shape[0] - 1

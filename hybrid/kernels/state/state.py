@@ -97,6 +97,7 @@ NO_BEND_LAW: Floats = np.zeros((0, 7))
 # Of a line without layers that slip (kernels.laws.bending_law has the columns).
 NO_SLIP: Floats = np.zeros((0, 4))
 NO_SLIP_FLOW: Floats = np.zeros((0, 2))
+ROWS: Floats = np.zeros((1, 3))  # any, as an example
 NO_LAYERS: Floats = np.zeros((0, 0))
 # Of a line without vortices (kernels.laws.vortices has the columns).
 NO_WAKE_LAW: Floats = np.zeros((0, 8))
@@ -548,6 +549,16 @@ def blank_line(n_cells: int) -> Line:
     """A line of `n_cells` cells without length, mass or load."""
     along: dict[str, Any] = {name: blank(field, n_cells) for name, field in FIELDS.items()}
     return Line(**along, bits=0)
+
+
+def on_line(*more: Any) -> Callable[[], tuple[Any, ...]]:
+    """Makes arguments of a kernel as examples: a line, and more (kernels.machine.compile.linked_kernel)."""
+    return lambda: (blank_line(1), *more)
+
+
+def in_sea(*more: Any) -> Callable[[], tuple[Any, ...]]:
+    """The same of a line and a sea."""
+    return lambda: (blank_line(1), no_sea(1), *more)
 
 
 def no_ends() -> Ends:
