@@ -15,7 +15,8 @@ from collections import Counter
 from pathlib import Path
 
 HYBRID = Path(__file__).parents[1] / "hybrid"
-KINDS = ("inner", "kernel", "called", "linked_kernel")
+ENTRIES = "kernel", "linked_kernel"
+KINDS = ("inner", "called", *ENTRIES)
 SHOWN, COPIES = 12, 16
 Name = tuple[str, str]  # module, function
 
@@ -91,7 +92,7 @@ def label(name: Name) -> str:
 
 def main(asked: list[str]) -> None:
     kernels = Kernels()
-    entries = [x for x, kind in kernels.kind.items() if kind == "kernel"]
+    entries = [x for x, kind in kernels.kind.items() if kind in ENTRIES]
     if unknown := set(asked) - {label(x) for x in entries}:
         raise SystemExit(f"no kernel is called {', '.join(sorted(unknown))}: file.function, as in run.in_space")
     sizes = {x: kernels.sizes(x) for x in entries if not asked or label(x) in asked}
