@@ -23,9 +23,9 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import LOST_WORK, STRETCH_ENERGY
-from hybrid.kernels.state.state import WORKING
+from hybrid.kernels.state.state import WORKING, blank_state, on_line
 
 # Columns of Line.law: of a cell, its first row in Line.law_table and the row behind its last (equal: tension is a multiple
 # of strain there); a, b and tau; the shape of working curves (0: there are none), its two numbers, the peak before the
@@ -299,6 +299,12 @@ def strain_and_energy_at(line, state, i, T):
     """The same under a tension T (N) that is not the state's."""
     if not has_law(line, i):
         return line.ck[i] * T, 0.5 * line.ck[i] * T * T
+    return strain_of_law(line, state, i, T)
+
+
+@linked_kernel(on_line(blank_state(1), 0, 0.0), (0.0, 0.0))
+def strain_of_law(line, state, i, T):
+    """The same of a cell with a law."""
     law, first, last = line.law, int(line.law[i, FIRST]), int(line.law[i, LAST])
     if not law[i, DYNAMIC] > 0.0:
         strain, _, stored = strain_at(line.law_table, first, last, T)
@@ -332,7 +338,7 @@ def stretch_work(line, state, c):
     return state.T[c] * (1.0 + strain) - energy
 
 
-@kernel
+@linked_kernel(on_line(blank_state(1)), 0.0)
 def stretch_energy(line, state):
     """Energy, J, of the stretch of a line without damping, from its tensions.
 

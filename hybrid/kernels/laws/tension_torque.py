@@ -38,6 +38,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hybrid.kernels.algebra.block_elimination import WIDTH
 from hybrid.kernels.algebra.rotations import (
     add,
@@ -70,8 +72,9 @@ from hybrid.kernels.laws.axial_law import (
     strain_and_energy_at,
 )
 from hybrid.kernels.laws.element import chord, relative_rotation, turns_freely
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import LOST_WORK, STIFFNESS_DAMPING, STRETCH_ENERGY
+from hybrid.kernels.state.state import ROWS, blank_line, blank_state
 
 # Columns of Work.couple, of the element at a node.
 AXIS = 0  # 3, kb p
@@ -140,7 +143,12 @@ class Side(NamedTuple):
     il: float
 
 
-@kernel
+Z3 = (0.0, 0.0, 0.0)
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SIDE, RATES = Side(Z9, Z3, 0.0), (Z3, Z9, Z3)  # examples
+
+
+@linked_kernel(lambda: (ROWS, blank_line(1), np.zeros(1), 0, SIDE, SIDE, RATES, RATES, 0.0))
 def note_element(couple, line, T, i, before, after, rates_before, rates_after, tau):
     """What the rows of an element at node i need.
 
@@ -174,7 +182,7 @@ def note_element(couple, line, T, i, before, after, rates_before, rates_after, t
     couple[i, TORQUE] = kb * (k[2] - line.k0[i, 2] + twist_by_tension(line, T, i) + tau * rate)
 
 
-@kernel
+@linked_kernel(lambda: (ROWS, blank_line(1), 0, Z3, Z3, 0.0))
 def note_end_torque(couple, line, i, moment, d, il):
     """At a node without element: of a rod's end the torque of the moment (N m) that is given; d, il: of its cell.
 
@@ -193,7 +201,7 @@ def note_end_torque(couple, line, i, moment, d, il):
             couple[i, AFTER + j if i == 0 else BEFORE + j] = x if i == 0 else -x
 
 
-@kernel
+@linked_kernel(lambda: (ROWS, blank_line(1), 0, 0.0), (0.0, 0.0))
 def couple_length(couple, line, i, T):
     """Of the law of length of cell i: what its compliance (m/N) and its gap (m) get."""
     g = line.tension_twist[i]
@@ -214,7 +222,7 @@ def damped_compliance(line, state, i, along):
     return line.h[i] * softness_of_damping(line, state, i, line.tau[i] * along / line.h[i])
 
 
-@kernel
+@linked_kernel(lambda: (ROWS, blank_line(1), blank_state(1), 0, 0.0), 0.0)
 def damping_loss(couple, line, state, i, along):
     """Power, W, that damping takes out of cell i but for the torsion of its elements; along: rate of its length, m/s."""
     if line.spin[i]:
@@ -231,7 +239,7 @@ def twist_of(line, i):
     return line.tension_twist[i] if 0 <= i < line.h.shape[0] else 0.0
 
 
-@kernel
+@linked_kernel(lambda: (np.zeros(1), ROWS, blank_line(1), ROWS, 0))
 def couple_rows(W, couple, line, e, i):
     """Put the tensions into the balance of node i and the spin of cell i, and the twist into the length of cell i-1.
 

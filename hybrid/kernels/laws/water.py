@@ -56,8 +56,8 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.laws import drag_law
-from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.state import LANES
+from hybrid.kernels.machine.compile import inner, linked_kernel
+from hybrid.kernels.state.state import LANES, ROWS, no_sea
 
 # A component whose motion has faded to this part of its surface value is left out at that depth.
 FADED = 1e-4
@@ -219,7 +219,7 @@ def still_below(sea):
     return sea.surface + LAST / least - highest
 
 
-@kernel
+@linked_kernel(lambda: (no_sea(1), ROWS, ROWS))
 def wave_kinematics(sea, r, u):
     """Fill sea.flow: velocity and acceleration of the waves at the positions r + u, and the elevation above them.
 

@@ -17,7 +17,7 @@ from hybrid.kernels.laws.sheaves import find_rates_of_sheaves, predict_sheaves
 from hybrid.kernels.laws.soil import slide_on, update_soil
 from hybrid.kernels.laws.vortices import advance_wake
 from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.march.march import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.state.report import (
@@ -45,7 +45,7 @@ from hybrid.kernels.state.report import (
     WAVES,
     WRONG_PIVOTS,
 )
-from hybrid.kernels.state.state import Floats, State
+from hybrid.kernels.state.state import ROWS, Floats, State, no_sea
 from hybrid.kernels.step.step_control import weights
 
 # A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts; so is one in
@@ -80,7 +80,7 @@ def largest_turn(e, u):
     return math.sqrt(widest), where
 
 
-@kernel
+@linked_kernel(lambda: (no_sea(1), ROWS, ROWS, ROWS, ROWS))
 def friction_axes(sea, r, e, slip, grip):
     """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
     last = e.shape[0]
