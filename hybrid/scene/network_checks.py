@@ -24,8 +24,11 @@ from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.start_checks import SAME_LENGTH
 
 
-def findings_of(network: Network) -> Iterator[Iterator[Finding]]:
-    """What contradicts in a network, in groups: of the first one with findings no later one makes sense."""
+def findings_of(network: Network, judged: bool = False) -> Iterator[Iterator[Finding]]:
+    """What contradicts in a network, in groups: of the first one with findings no later one makes sense.
+
+    judged: whether each line has been by itself, in the short form.
+    """
     yield _unknown_names(network)
     yield _refused_combinations(network)
     yield chain(_lonely_points(network), () if network.starts_as_placed else floating_groups(network))
@@ -34,7 +37,7 @@ def findings_of(network: Network) -> Iterator[Iterator[Finding]]:
     yield _touching_findings(network)
     yield chain.from_iterable(_body_findings(network, name) for name in network.bodies)
     yield chain.from_iterable(_moment_findings(network, name) for name in network.points)
-    yield chain.from_iterable(_line_findings(network, name) for name in network.lines)
+    yield chain.from_iterable(_line_findings(network, name) for name in network.lines if not judged)
     yield _in_a_plane(network)
     yield travel_findings(network)
     yield elevation_has_waves(network.output, network.environment)

@@ -262,22 +262,21 @@ class Scene(Network):
         if isinstance(data, Mapping) and not names_lines(data):
             line = CableScene.model_validate(data)
         if not isinstance(line, CableScene):
-            return handler(data)
+            scene = handler(data)
+            for findings in findings_of(scene):
+                refuse(findings)
+            return scene
         refuse(motion_findings({name: getattr(line, name) for name in CableScene.model_fields}))
         try:
             scene = handler(network_tables(line))
         except ValidationError as error:
-            refuse(_refused(line, error))
+            refuse(short_form(line).finding(x) for x in _refused(error))
             raise
+        for findings in findings_of(scene, judged=True):
+            refuse(short_form(line).finding(x) for x in findings)
         scene._short = True
         scene._known_scenes[SHORT] = line
         return scene
-
-    @model_validator(mode="after")
-    def _no_contradiction(self) -> Self:
-        for findings in findings_of(self):
-            refuse(findings)
-        return self
 
     @model_serializer(mode="wrap")
     def _written(self, handler: SerializerFunctionWrapHandler, info: SerializationInfo) -> dict[str, Any]:
@@ -344,10 +343,9 @@ def in_full(scene: Scene) -> Scene:
     return Scene.model_validate(network_tables(scene._as_cable)) if scene._short else scene
 
 
-def _refused(line: CableScene, error: ValidationError) -> Iterator[Finding]:
-    """What the network of a cable refuses, where the cable has it."""
-    form = short_form(line)
+def _refused(error: ValidationError) -> Iterator[Finding]:
+    """What tables of a network refuse, each under its own key of the network."""
     for each in error.errors(include_url=False):
         at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
         for x in (each.get("ctx") or {}).get("findings") or [Finding((), "what a network of one line has")]:
-            yield form.finding(Finding((*at, *x.at), x.expected, x.fix, x.given))
+            yield Finding((*at, *x.at), x.expected, x.fix, x.given)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 import numpy as np
 
 from hybrid.kernels.contact.self_distance import Itself, blank_itself, blank_itself_job, boxes_of
-from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.machine.binding import Packed, Room, Table, address
 from hybrid.kernels.mesh import remesh as f
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
 from hybrid.kernels.run.entry import NO_PUSH, workspace
@@ -405,7 +405,7 @@ class Remesh:
             places = of_itself[0].places(IN_ITSELF)
             numbers["itself"], numbers["itself_places"] = self._watch_table.numbers, places
             numbers["in_itself"] = np.array([x.numbers[:, places] for x in of_itself])
-            tree = self._itself.tree.__array_interface__["data"][0]
+            tree = address(self._itself.tree)
             at.boxes_at = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         ends = np.cumsum([0, *(len(x[0].table.numbers) for x in change)])
         calls = [(p.kernel.address(change[p.table][0].table.numbers), *ends[p.table : p.table + 2]) for p in parts]

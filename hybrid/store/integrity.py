@@ -266,18 +266,18 @@ class _Arrays:
 
 def _plain(x: Any, arrays: _Arrays) -> Any:
     """What JSON can write; the bytes of arrays are added to `arrays`."""
-    if isinstance(x, Mapping):
-        return {name: _plain(value, arrays) for name, value in x.items()}
-    if isinstance(x, list | tuple):
-        return [_plain(value, arrays) for value in x]
+    if isinstance(x, np.ndarray):
+        name = x.dtype.newbyteorder("<").str
+        if name not in DTYPES:
+            raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
+        return {ARRAY: [name, list(x.shape), arrays.add(np.ascontiguousarray(x, name).reshape(-1).view("u1"))]}
     if isinstance(x, np.generic):
         return x.item()
-    if not isinstance(x, np.ndarray):
+    if isinstance(x, list | tuple):
+        return [_plain(value, arrays) for value in x]
+    if x is None or isinstance(x, str | int | float):  # much sooner answered than whether it is a mapping
         return x
-    name = x.dtype.newbyteorder("<").str
-    if name not in DTYPES:
-        raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
-    return {ARRAY: [name, list(x.shape), arrays.add(np.ascontiguousarray(x, name).reshape(-1).view("u1"))]}
+    return {name: _plain(value, arrays) for name, value in x.items()} if isinstance(x, Mapping) else x
 
 
 def unpack(data: bytes) -> Tree:
