@@ -39,6 +39,7 @@ _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole,
 # Bytes of a page of a new file, and pages that wait in memory.
 _PAGE = 1 << 18
 _MOST_PAGES = 16
+_DRAFTED = 1 << 20  # bytes of metadata: lines are written one after the other, of those before nothing is needed
 
 
 # ---- reading --------------------------------------------------------------------------------------
@@ -222,6 +223,7 @@ def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
     """A new file that is made in one go; OSError when it could not be written."""
     with _Draft(path, f"{mode.rstrip('+')}+") as draft:
         with h5py.File(draft, mode, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS) as file:
+            bound_metadata(file, _DRAFTED)
             yield file
         draft.put_all()
         if draft.error is not None:
@@ -269,14 +271,14 @@ def _opened_for_many(path: Path) -> h5py.File:
     return h5py.File(h5f.open(os.fsencode(path), h5f.ACC_RDWR, access))
 
 
-def hold_metadata(file: h5py.File) -> None:
-    """Let a file of many datasets keep what it knows of them in memory, up to `METADATA` bytes.
+def bound_metadata(file: h5py.File, size: int = METADATA) -> None:
+    """Let a file of many datasets keep what it knows of them in memory, up to so many bytes.
 
     Written by one and read by many, HDF5 2.0 fails where it has to drop some of it ("doesn't have a flush dependency
     parent array"): results of 200 lines could not be written, and closing them ended the process.
     """
     config = file.id.get_mdc_config()
-    config.set_initial_size, config.initial_size, config.max_size = True, METADATA, METADATA
+    config.set_initial_size, config.initial_size, config.max_size = True, size, size
     config.incr_mode = config.flash_incr_mode = config.decr_mode = 0
     file.id.set_mdc_config(config)
 

@@ -52,13 +52,13 @@ from hybrid.store.format import (
 )
 from hybrid.store.hdf5_file import (
     GROUP,
+    bound_metadata,
     check_target,
     copied,
     created,
     drafted,
     give_up,
     group_of,
-    hold_metadata,
     in_memory,
     in_turn,
     names_in,
@@ -379,7 +379,7 @@ class Recorder(Rows):
         self._file = created(self.path, make, many=bool(self._parts))
         self._broken = False
         if self._parts:
-            hold_metadata(self._file)
+            bound_metadata(self._file)
         for name, each in self._every().items():
             for table in each._all:
                 table.move(root_of(self._file, name))
@@ -399,7 +399,7 @@ class Recorder(Rows):
         """
         if self._file is None:  # whatever is written, is written at once
             self._number += bool(self._checkpoints)
-            self._checkpoints.pop(self._number - len(SLOTS), None)
+            self._checkpoints.clear()
         every = self._every()
         rows = {name: {x.scale: x.count + x.waiting for x in each._all if x.fields} for name, each in every.items()}
         happened = of_all({name: each._happened for name, each in every.items()})

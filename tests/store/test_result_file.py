@@ -24,7 +24,7 @@ from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field, Header
-from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
+from hybrid.store.hdf5_file import SLOTS, bound_metadata, created, in_memory
 from hybrid.store.reader import Result, open_result
 from hybrid.store.recorder import Rows
 from hybrid.store.records import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, Event, Zone
@@ -497,7 +497,7 @@ def test_what_is_known_of_a_dataset_of_many_goes_when_it_is_closed(tmp_path: Pat
         made.flush()
         image = made.id.get_file_image()
     with created(tmp_path / "many.h5", lambda path: path.write_bytes(image), many=True) as file:
-        hold_metadata(file)
+        bound_metadata(file)
         for k in range(20):
             data = file[f"x{k}"]
             data.resize((5,))
