@@ -65,9 +65,10 @@ if TYPE_CHECKING:
 
 # Columns of the step log that runs to compare with keep: time, forces at both ends.
 FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]
-# Outputs of a line that wait for one another: quantities of all of them are computed together.  Numbers of those of all
-# lines that do, 32 MB: quantities of fewer outputs take as long.
-WAITING, MOST_WAITING = 64, 4_000_000
+# Outputs of a line that wait for one another, because quantities of all of them are computed together: at most so many,
+# of so many numbers, 2 MB, which a processor keeps: with 64 of 100 cells a run takes 5 % more, with 256 3 %.
+WAITING, TOGETHER = 512, 250_000
+MOST_WAITING = 4_000_000  # numbers of those of all lines that wait, 32 MB: quantities of fewer outputs take as long
 # Nodes of outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
 MOST_ASIDE = 20_000
 FEWEST_JOINED = 4
@@ -144,7 +145,7 @@ class LineResult:
 
     cells: CellChanges | NodeChanges | None = None  # what changes cells, or lets nodes enter and leave, without Python
     _at_rest: tuple[Sequence[float], State]  # the sharpest bend and twist of an equilibrium, and its state
-    _most = WAITING  # outputs that may wait
+    _most = 1  # outputs that may wait
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 
     def __init__(
@@ -222,9 +223,14 @@ class LineResult:
             cells = max(cells, self.paying.most_cells)
         return sample_size(cells, layout is not None, *more)
 
+    @property
+    def together(self) -> int:
+        """How many of its outputs are to wait for one another."""
+        return max(1, min(WAITING, TOGETHER // self.sample_size))
+
     def make_room(self, rows: int, waiting: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone.  waiting: how many may wait."""
-        shape, self._most = (rows, self.sample_size), waiting
+        shape, self._most = (rows, self.sample_size), min(self.together, waiting)
         if self.books.samples.shape != shape:
             self.books = self.books._replace(samples=np.zeros(shape))
 
@@ -463,7 +469,7 @@ class LineResult:
             if self.observer.writes_criteria and self.manager is not None:
                 now = self.manager.largest_ratios(self.observer.grid.s)
                 self._ratios.append(np.repeat(now[None], len(batch.t), axis=0))
-        full = sum(len(x.t) for x in self._waiting) >= min(WAITING, self._most)
+        full = sum(len(x.t) for x in self._waiting) >= self._most
         full |= sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE
         full |= self.cells is not None and bool(self._waiting)  # which change, and these with them
         if full or not self._moves:

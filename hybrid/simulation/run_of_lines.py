@@ -30,7 +30,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.diagnostics import LineStep
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_result import MOST_WAITING, WAITING, LineResult
+from hybrid.simulation.line_result import MOST_WAITING, LineResult
 from hybrid.simulation.parts import Part, Parts, Sampled
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
@@ -180,7 +180,7 @@ class RunOfLines:
     def _make_room(self, solver: NetworkSolver) -> None:
         """Room for samples of the lines and bodies as they are."""
         size = sum(line.sample_size for line in self.lines)
-        rows = max(1, min(WAITING, MOST_SAMPLED // size))
+        rows = max(1, min(MOST_SAMPLED // size, *(line.together for line in self.lines)))
         for line in self.lines:
             line.make_room(rows, MOST_WAITING // size)
         self.loop.make_room(rows, len(solver.body_work))

@@ -31,7 +31,7 @@ from hybrid.store.recorder import Table
 LIBVER = ("v110", "v110")
 # Places for chunks in the cache of a dataset, which is written at its end: HDF5 2.0 takes 8191, 64 kB a dataset.
 SLOTS = 31
-# Bytes by which a file in memory grows: by 64 kB, as HDF5 would, one of 12 MB takes 15 ms more.
+# Bytes by which a file in memory grows at least: by 64 kB, as HDF5 would, one of 12 MB takes 15 ms more.
 GROWTH = 1 << 20
 METADATA = 128 * 1024 * 1024  # bytes: the most that HDF5 takes
 MORE_SPACE = "free some disk space; close programs that hold the file"  # advice
@@ -283,9 +283,10 @@ def bound_metadata(file: h5py.File, size: int = METADATA) -> None:
     file.id.set_mdc_config(config)
 
 
-def in_memory(content: bytes = b"") -> h5py.File:
-    """A file in memory, to be written; content: of an existing one."""
-    return h5py.File.in_memory(content, block_size=GROWTH, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
+def in_memory(content: bytes = b"", more: int = 0) -> h5py.File:
+    """A file in memory, to be written; content: of an existing one; more: bytes that come to it, at a guess."""
+    growth = GROWTH * (1 + more // GROWTH)
+    return h5py.File.in_memory(content, block_size=growth, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
 
 
 def image_of(file: h5py.File) -> bytes:

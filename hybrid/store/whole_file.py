@@ -11,6 +11,7 @@ needs neither: its result waits in memory (`LateFile`), is added to until all is
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from functools import cache
@@ -49,8 +50,9 @@ MOST_STAYING = 256_000_000
 _staying: WeakSet[ArrayContents] = WeakSet()
 # Lines in a file that begins as a template, and templates that are kept, of 80 kB a line.
 MOST_LINES, MOST_KEPT = 8, 32
-# Bytes of values for which a template has room, which stay with it.
-MOST_PLACED = 1_000_000
+# Bytes of a dataset for whose values a template has room, and of all of these, which stay with it; HDF5 takes as long
+# to open a dataset as to write some 100 kB.
+LARGEST_PLACED, MOST_PLACED = 32_768, 1_000_000
 _kept: dict[Hashable, Template] = {}
 
 
@@ -135,7 +137,11 @@ def write_result(
     The rest: as of `image_of_result`; OSError: it cannot be written.
     """
     if len(contents.parts) < MOST_LINES:
-        path.write_bytes(image_of_result(contents, restart, outputs, complete))
+        image, placed = _image_of_few(contents, restart, outputs, complete)
+        with path.open("wb", buffering=0) as file:
+            _write_at(file, 0, image)
+            for at, data in placed:
+                _write_at(file, at, data)
         return
     with drafted(path) as file:
         _write_lines(file, contents, restart, outputs, complete)
@@ -149,12 +155,33 @@ def image_of_result(
     restart: None: nobody can go on with it; outputs: their number if it is known, which only makes small files smaller;
     complete: whether no rows will be added before it is copied.
     """
-    groups = dict(groups_of(contents))
     if len(contents.parts) >= MOST_LINES:
         file = in_memory()
         _write_lines(file, contents, restart, outputs, complete)
         return image_of(file)
-    complete &= contents.size <= MOST_PLACED
+    image, placed = _image_of_few(contents, restart, outputs, complete)
+    if not placed:
+        return image
+    whole = bytearray(image)
+    for at, data in placed:
+        whole[at : at + len(data)] = data
+    return whole
+
+
+def _write_at(file: io.FileIO, at: int, data: bytes) -> None:
+    left = memoryview(data)
+    file.seek(at)
+    while left.nbytes:
+        left = left[file.write(left) :]
+
+
+def _image_of_few(
+    contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool
+) -> tuple[bytes, list[tuple[int, bytes]]]:
+    """The file of a result of few lines, and what is still to be put in its place there."""
+    groups = dict(groups_of(contents))
+    placed = sum(x.values.nbytes for part in groups.values() for x in part.data.values() if _has_place(x, complete))
+    complete &= placed <= MOST_PLACED
     of_groups = ((group, _shape_of(part, complete)) for group, part in groups.items())
     shape = (*of_groups, outputs, restart is not None, complete)
     if shape not in _kept:
@@ -162,17 +189,12 @@ def image_of_result(
             _kept.clear()
         _kept[shape] = _template(groups, restart is not None, outputs, complete)
     template = _kept[shape]
-    file = in_memory(template.content)
+    file = in_memory(template.content, contents.size - placed)
     for group, part in groups.items():
         _fill(file, group, part, {}, template.places)
     _finish(file, contents, restart)
-    image = bytearray(image_of(file))
-    for (group, name), places in template.places.items():
-        values = groups[group].data[name].values
-        for at, rows in places:
-            data = np.ascontiguousarray(values[rows]).tobytes()
-            image[at : at + len(data)] = data
-    return image
+    rows = ((groups[group].data[name].values, at) for (group, name), at in template.places.items())
+    return image_of(file), [(at, np.ascontiguousarray(x[of]).tobytes()) for x, places in rows for at, of in places]
 
 
 def _write_lines(
@@ -225,7 +247,8 @@ def _template(groups: Mapping[str, ArrayContents], resumable: bool, outputs: int
 
 def _has_place(x: ArrayDataset, complete: bool) -> bool:
     """Whether a template has room for the values of a dataset: rows of tables beside the outputs are of any number."""
-    return complete and bool(x.values.size) and (not x.grows or x.dims[0] == "t")
+    small = 0 < x.values.nbytes <= LARGEST_PLACED
+    return complete and small and (not x.grows or x.dims[0] == "t")
 
 
 def _places(data: h5d.DatasetID, x: ArrayDataset) -> list[tuple[int, Any]]:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.simulation.run_of_lines
 import hybrid.simulation.run_record
 from hybrid.errors import SceneError
 from hybrid.simulation import line_result
@@ -64,7 +63,6 @@ def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.Mo
         file, settings = "laying_winch", ["time={duration: 9, step: 0.1}", settings[1]]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / f"{file}.yaml", settings)
     batches = hybrid.run(scene, criterion=criterion)
-    monkeypatch.setattr(hybrid.simulation.run_of_lines, "WAITING", 1)
     monkeypatch.setattr(line_result, "WAITING", 1)
     one_by_one = hybrid.run(scene, criterion=criterion)
     if name == "cells":
@@ -227,7 +225,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
     """The same bits at the same times, whatever other outputs there are, and however few of them a buffer takes."""
     many = hybrid.run(moored(0.03, 0.02, 1.2))
     few = hybrid.run(moored(0.03, 0.08, 1.2))
-    monkeypatch.setattr(hybrid.simulation.run_of_lines, "WAITING", 1)
+    monkeypatch.setattr(line_result, "WAITING", 1)
     assert_same(many, hybrid.run(moored(0.03, 0.02, 1.2)))
     assert np.array_equal(many.lines["up"]["steps/dt"], few.lines["up"]["steps/dt"])
     mine = fields(many)
