@@ -216,17 +216,22 @@ class LineResult:
     @property
     def sample_size(self) -> int:
         """Numbers of an output of the line, of the most cells that it may have."""
-        line, layout, touches = self.model.line, self.model.layout, self.books.touch.size > 0
-        more = len(line.torsion), touches, line.moved.size, sampled_size(line)
-        cells = line.h.size if layout is None else int(layout.starts[-1])
-        if layout is None and self.paying is not None:
+        cells, layout = self.model.line.h.size, self.model.layout
+        if layout is not None:
+            cells = int(layout.starts[-1])
+        elif self.paying is not None:
             cells = max(cells, self.paying.most_cells)
-        return sample_size(cells, layout is not None, *more)
+        return self._sample_size(cells)
+
+    def _sample_size(self, cells: int) -> int:
+        line, touches = self.model.line, self.books.touch.size > 0
+        more = len(line.torsion), touches, line.moved.size, sampled_size(line)
+        return sample_size(cells, self.model.layout is not None, *more)
 
     @property
     def together(self) -> int:
         """How many of its outputs are to wait for one another."""
-        return max(1, min(WAITING, TOGETHER // self.sample_size))
+        return max(1, min(WAITING, TOGETHER // self._sample_size(self.model.line.h.size)))
 
     def make_room(self, rows: int, waiting: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone.  waiting: how many may wait."""
