@@ -1,4 +1,4 @@
-"""What an accuracy costs when it is loosened: a tether with a float in the heave of a ship, and one with a float pack.
+"""What an accuracy costs when it is loosened: tethers with a float, with a float pack, and of 3000 m with a slack bend.
 
     pytest bench/test_bench_loosening.py -m bench -n 0 -s
 
@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[1]
 SCENES = {
     "rov_tether": ROOT / "examples" / "rov_tether.yaml",
     "float_pack_tension": ROOT / "tests" / "data" / "defects" / "float_pack_tension.yaml",
+    "long_s_tether": ROOT / "tests" / "data" / "defects" / "long_s_tether.yaml",
 }
 ASKED, ROUNDS = (10.0, 5.0, 2.0, 1.0), 3  # per cent
 LOOSER, SPARE = 1.5, 3.0  # times as much for the next finer accuracy, times better than asked at most

@@ -122,14 +122,15 @@ def as_halved(found: Falls, finer: tuple[float, float], share: float) -> Falls:
 def force_orders(found: Falls, from_rest: bool = True, shaken: bool = False) -> tuple[float, float]:
     """Bounds of the order with which a force at an end converges.
 
-    from_rest: in a motion from an equilibrium; shaken: in which a ramp sets off vibrations along the line that matter.
+    from_rest: in a motion from an equilibrium; shaken: in which a ramp sets off vibrations along the line that matter,
+    whose slow fall is not ruled out where it is not known.
     """
-    return ORDERS if from_rest and not (shaken and found.mean > BELOW_FIRST) else START_ORDERS
+    return ORDERS if from_rest and not (shaken and not found.mean <= BELOW_FIRST) else START_ORDERS
 
 
 def order(found: float, bounds: tuple[float, float]) -> float:
-    """The order with which an output converges; bounded, because a ratio of noise is one as well."""
-    return ORDER if np.isnan(found) else float(np.clip(-np.log(found) / np.log(COARSER), *bounds))
+    """The order with which an output converges, the least where it is not shown; a ratio of noise is one as well."""
+    return bounds[0] if np.isnan(found) else float(np.clip(-np.log(found) / np.log(COARSER), *bounds))
 
 
 def times_foretold(

@@ -363,9 +363,21 @@ def shown(scenes: Mapping[str, LineScene], resolution: NetworkResolution, rests:
     """With cells on which the equilibrium is found, and bends no rod by more than MOST_FOLD from one cell to the next.
 
     Of lines that have a pre-run.  A slack bend is often shorter than the cells of that by far, and on such cells it may
-    be anywhere.
+    be anywhere: where the usual mesh, whatever is asked, shows a fold, its cells are placed and counted from that.
     """
     wanted = [x for x, scene in scenes.items() if _is_open(scene, resolution.lines[x]) and wants_survey(scene)]
+    usual = {k: replace(x, fineness=max(x.fineness, 1.0)) if k in wanted else x for k, x in resolution.lines.items()}
+    if any(shows_bends(scenes[name]) for name in wanted):
+        found = _unfolded(scenes, wanted, NetworkResolution(usual), rests)
+        if any(found.lines[name].grading is not None for name in wanted):
+            return found
+    return _unfolded(scenes, wanted, resolution, rests)
+
+
+def _unfolded(
+    scenes: Mapping[str, LineScene], wanted: Sequence[str], resolution: NetworkResolution, rests: Rests
+) -> NetworkResolution:
+    """The cells of `shown` that begin with those of a resolution; wanted: names of lines whose cells are placed."""
     tried, found = resolution, resolution
     for _ in range(ROUNDS if wanted else 0):
         try:
@@ -374,7 +386,7 @@ def shown(scenes: Mapping[str, LineScene], resolution: NetworkResolution, rests:
             lines = tried.lines.items()
             tried = NetworkResolution({k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines})
             continue
-        found, finer = tried, _graded(tried, {name: _unfolded(scenes[name], *rest[name]) for name in wanted})
+        found, finer = tried, _graded(tried, {name: _unfolding(scenes[name], *rest[name]) for name in wanted})
         if finer is tried:
             return tried
         tried = finer
@@ -405,7 +417,7 @@ def rods_at_rest(network: Network, resolution: NetworkResolution, moves: bool) -
     return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
 
 
-def _unfolded(scene: LineScene, model: Model, state: State) -> Grading | None:
+def _unfolding(scene: LineScene, model: Model, state: State) -> Grading | None:
     """The cells that show the bends of a state, where a rod folds from one cell to the next; None: none does."""
     return grading_of(scene, model, state) if float(_turns(model, state).max()) > MOST_FOLD else None
 
