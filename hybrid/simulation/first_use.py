@@ -35,6 +35,9 @@ STABILITY, TOUCHING = "laws.out_of_plane.wrong_pivots_at_rest", "contact.self_co
 OF_JOINED = "run.newton.solve_network", "junctions.junctions.join_lines"
 STEPS_OF_LINES, REST_OF_LINES = "run.network_run.run_network", "run.network_run.sample_network"
 BOOKS_OF_LINES, START_OF_LINES = "run.network.book_network_step", "run.network.begin_line"
+# What several of these call, each compiled once: extremes and criteria of zones of a state, its energies.
+EXTREMES, WEIGHED = "watch.extremes.note_extremes", "mesh.zone_step.evaluate"
+ENERGIES = "march.energies.observe"
 TOUCHING_LINES = "junctions.lines_contact.touch_network", "junctions.lines_contact.shared_task"
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "mesh.remesh.change_cells"  # this one: the rest
 
@@ -61,7 +64,8 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     alone = {name: x for name, x in lines.items() if name not in together}
     planar = {name: x for name, x in alone.items() if not _is_in_space(x, scene.dimension)}
     found = [SOLVER[0]] * bool(planar) + [SOLVER[1]] * (len(planar) < len(lines))
-    found += [START_OF_LINES, *([REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]), OUTPUTS]
+    found += [START_OF_LINES, EXTREMES, ENERGIES, OUTPUTS]
+    found += [REST_OF_LINES] if static else [STEPS_OF_LINES, BOOKS_OF_LINES]
     touch_themselves = any(x.contact.self for x in lines.values())
     if together or touch_themselves:
         found += OF_JOINED
@@ -69,7 +73,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     if any(_is_judged(x, static) for name, x in planar.items() if name in rods):
         found.append(STABILITY)
     if scene.time is not None and scene.adaptive:
-        found += [CRITERIA] if static else [*ZONE_CHANGES, ZONES]
+        found += [WEIGHED, *([CRITERIA] if static else [*ZONE_CHANGES, ZONES])]
     if not static and any(payout_of(x) is not None for x in lines.values()):
         found += PAYOUT_OF_LINES
     if pairs or touch_themselves:
@@ -137,7 +141,7 @@ def compile_all(names: Sequence[str]) -> None:
     """
     scene = Scene.model_validate(SAMPLE).asked_scene("")
     model = build(scene)
-    _compile_by_table(names, *OF_JOINED)
+    _compile_by_table(names, ENERGIES, EXTREMES, WEIGHED, *OF_JOINED)
     if ZONES in names or CRITERIA in names:
         _compile_criteria(scene, model)
     _compile_by_table(names, *ZONE_CHANGES, ZONES)
@@ -151,7 +155,7 @@ def compile_all(names: Sequence[str]) -> None:
 
 
 def _compile_by_table(names: Sequence[str], *kernels: str) -> None:
-    """Those kernels, among those of these names, that take one table."""
+    """Those kernels, among those of these names, that take one table, and those that others call."""
     for name in kernels:
         if name in names:
             entry(name).compile_unless_busy(NO_TABLE)

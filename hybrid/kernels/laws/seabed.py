@@ -37,8 +37,8 @@ import math
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, dot, scale
-from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.state.state import Floats, Sea
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
+from hybrid.kernels.state.state import Floats, Sea, no_sea
 
 HEIGHTS = 4  # numbers of a point of the grid: z, zx, zy, zxy
 
@@ -82,7 +82,7 @@ def weigh(heights, a, b, k, rows):
     )
 
 
-@called
+@linked_kernel(lambda: (no_sea(1), 0.0, 0.0), (0.0, 0.0, 0.0))
 def height_on_grid(sea, x, y):
     """z, zx, zy of a bed of depths."""
     i, j = interval(sea.bed_x, x), interval(sea.bed_y, y)
@@ -134,7 +134,7 @@ def bends_on_grid(sea, x, y):
     return zxx, weigh(heights, da, db, k, rows), zyy
 
 
-@kernel
+@linked_kernel(lambda: (no_sea(1), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 def normal_turns(sea, x, n):
     """dn_i/dx_j of the bed under a point x on a bed of depths: -n_z (I - n n^T) H, H the second derivatives of z."""
     zxx, zxy, zyy = bends_on_grid(sea, x[0], x[1])

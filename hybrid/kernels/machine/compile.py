@@ -129,6 +129,10 @@ class Linked(Entry):
 
         return type_of_linked(self)
 
+    def compile_unless_busy(self, *args: Any) -> None:
+        """Compile for what its callers give, unless another process is doing it."""
+        super().compile_unless_busy(*self.arguments())
+
     def find(self) -> int:
         """The address of its machine code."""
         return self.address(*self.arguments())

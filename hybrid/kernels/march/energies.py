@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, scale, sub
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at, energy_share, stored_by_slip
 from hybrid.kernels.laws.element import chord, strain_of_element, turning
 from hybrid.kernels.laws.tension_torque import couples, rest_strain, stretch_energy
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import FIRST, LAST, TORQUE
 from hybrid.kernels.state.books import CONTACT, FRICTION, HYSTERESIS, OBSTACLE, RATES, WORKS
@@ -38,7 +40,7 @@ from hybrid.kernels.state.report import (
     TOUCHES,
     WAVE_POWER,
 )
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import ROWS, Floats, no_ends, on_line
 
 
 @inner
@@ -61,7 +63,7 @@ class Observed(NamedTuple):
     energy: Floats
 
 
-@kernel
+@linked_kernel(on_line(no_ends(), ROWS, ROWS, ROWS, np.zeros(1), np.zeros(1), ROWS, Observed(ROWS, ROWS, np.zeros(5))))
 def observe(line, ends, e, v, a1, w, T, turn, observed):
     """Fill `Observed` with the moments, strains and energies of a state.
 

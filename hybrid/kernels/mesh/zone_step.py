@@ -62,7 +62,7 @@ from hybrid.kernels.mesh.zone_criteria import (
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.report import OBSTACLES, STRAND
-from hybrid.kernels.state.state import Ends, Floats, Line, Rows, Sea, State, blank_state, blanks, in_sea
+from hybrid.kernels.state.state import Ends, Floats, Line, Rows, Sea, State, blank_state, blanks, in_sea, no_ends
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
 LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
@@ -321,7 +321,7 @@ def asks_layers(zones):
     return zones.asked[CURVATURE] > 0.0 and not zones.asked[MOMENT] > 0.0 and not zones.clock.share > 0.0
 
 
-@inner
+@linked_kernel(in_sea(no_ends(), blank_state(1), blank_zones(1, 1), np.zeros(1), 0.0))
 def evaluate(line, sea, ends, state, zones, near, dt):
     """Raise the ratios since the last review to those of a state, dt after the last one; the highest of catenaries.
 

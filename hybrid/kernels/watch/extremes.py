@@ -26,7 +26,7 @@ from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import bed_under, pressure
 from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.laws.tension_torque import rest_strain
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.state.books import (
     CURVATURE,
@@ -38,9 +38,10 @@ from hybrid.kernels.state.books import (
     SELF_PRESSURE,
     TENSION,
     TORQUE,
+    blank_books,
 )
 from hybrid.kernels.state.report import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, blank_state, in_sea, no_ends
 from hybrid.kernels.watch.sides import (
     beside,
     element_strain,
@@ -197,7 +198,7 @@ def note_contact(line, sea, state, books, t):
         before, here = here, after
 
 
-@kernel  # once, for lines in a plane and in space, and for both places it is called from: 3 s less of compilation
+@linked_kernel(in_sea(no_ends(), blank_state(1), blank_books(), 0.0))  # once for begin_line and for book_network_step
 def note_extremes(line, sea, ends, state, books, t):
     """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
     put_layers(line, ends, state, books)
