@@ -192,7 +192,7 @@ def _numbers(value: Any, pattern: Any, name: str) -> list[int]:
 def address(array: NDArray[Any]) -> int:
     """Where the numbers of an array begin in memory."""
     try:
-        return addressof(c_char.from_buffer(array))
+        return addressof(c_char.from_buffer(array))  # type: ignore[arg-type]
     except (TypeError, ValueError):  # nobody may write to it, or it is empty: numpy's own way takes four times as long
         found: int = array.__array_interface__["data"][0]
         return found
