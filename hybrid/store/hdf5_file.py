@@ -32,7 +32,8 @@ LIBVER = ("v110", "v110")
 # Places for chunks in the cache of a dataset, which is written at its end: HDF5 2.0 takes 8191, 64 kB a dataset.
 SLOTS = 31
 # Bytes by which a file in memory grows at least: by 64 kB, as HDF5 would, one of 12 MB takes 15 ms more.
-GROWTH = 1 << 20
+# At once it takes what is to come, or so many times as much: the last growth may be empty.
+GROWTH, MOST_GROWTH = 1 << 20, 32
 METADATA = 128 * 1024 * 1024  # bytes: the most that HDF5 takes
 MORE_SPACE = "free some disk space; close programs that hold the file"  # advice
 _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
@@ -274,8 +275,9 @@ def _opened_for_many(path: Path) -> h5py.File:
 def bound_metadata(file: h5py.File, size: int = METADATA) -> None:
     """Let a file of many datasets keep what it knows of them in memory, up to so many bytes.
 
-    Written by one and read by many, HDF5 2.0 fails where it has to drop some of it ("doesn't have a flush dependency
-    parent array"): results of 200 lines could not be written, and closing them ended the process.
+    They may be few where nobody reads it before it is closed.  Written by one and read by many, HDF5 2.0 fails where it
+    has to drop some of it ("doesn't have a flush dependency parent array"): results of 200 lines could not be written,
+    and closing them ended the process.
     """
     config = file.id.get_mdc_config()
     config.set_initial_size, config.initial_size, config.max_size = True, size, size
@@ -284,8 +286,8 @@ def bound_metadata(file: h5py.File, size: int = METADATA) -> None:
 
 
 def in_memory(content: bytes = b"", more: int = 0) -> h5py.File:
-    """A file in memory, to be written; content: of an existing one; more: bytes that come to it, at a guess."""
-    growth = GROWTH * (1 + more // GROWTH)
+    """A file in memory, to be written; content: of an existing one; more: bytes of values that come to it."""
+    growth = GROWTH * min(1 + int(1.125 * (len(content) + more)) // GROWTH, MOST_GROWTH)  # with what is beside them
     return h5py.File.in_memory(content, block_size=growth, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
 
 

@@ -372,10 +372,8 @@ def page(result: Result) -> Page:
     grid = [below[k : k + wide] for k in range(0, len(below), wide)]
     rows += [row + [row[-1]] * (wide - len(row)) for row in grid]
     heights = [1.6 if set(row) <= {"s", "S"} else 1.0 for row in rows]
-    return page_of(
-        result, facts_line(result, every), panels=panels, mosaic=rows, widths=[1.0] * len(rows[0]), heights=heights,
-        legend=["s"],
-    )  # fmt: skip
+    even, facts = [1.0] * len(rows[0]), facts_line(result, every)
+    return page_of(result, facts, panels=panels, mosaic=rows, widths=even, heights=heights, legend=["s"])
 
 
 def _page_of_many(result: Result, every: AllLines, views: list[View], panels: dict[str, Panel]) -> Page:
@@ -385,7 +383,6 @@ def _page_of_many(result: Result, every: AllLines, views: list[View], panels: di
     rows = [[plan, plan, "p"]] + [[name] * 3 for name in others[:1]]
     rows += [[name, name, name] for name in others[1:3]]
     shown = {x for row in rows for x in row}
-    return page_of(
-        result, facts_line(result, every), panels={x: panel for x, panel in panels.items() if x in shown},
-        mosaic=rows, heights=[3.2, *[1.0] * (len(rows) - 1)], size=(8.0, 10.0), legend=["s"],
-    )  # fmt: skip
+    panels = {x: panel for x, panel in panels.items() if x in shown}
+    heights, facts = [3.2, *[1.0] * (len(rows) - 1)], facts_line(result, every)
+    return page_of(result, facts, panels=panels, mosaic=rows, heights=heights, size=(8.0, 10.0), legend=["s"])
