@@ -21,7 +21,8 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -71,14 +72,16 @@ class Column(NamedTuple):
     values: np.ndarray
 
 
-def _arrays_of(group: Any) -> dict[str, Any]:
-    """The arrays of a study by name, also while another process writes it or after that was killed.
+@contextmanager
+def _begun_passed_over() -> Iterator[None]:
+    """Arrays are listed also while another process writes them or after that was killed.
 
-    A file that is written at this moment has the ending `partial` until it is complete; zarr warns of it.
+    A file that is written at this moment has the ending `partial` until it is complete, and the folder of an array is
+    there before its description: zarr warns of both.
     """
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=r"Object at \S+\.partial is not recognized")
-        return dict(group.arrays())
+        warnings.filterwarnings("ignore", message=r"Object at \S+ is not recognized")
+        yield
 
 
 class StudyFile:
@@ -102,7 +105,8 @@ class StudyFile:
         self._status = np.asarray(self._group["status"][:])
         self.cases = int(self._group["case"].shape[0])
         # What is open already: to find and open an array in its folder takes longer than to write a chunk.
-        self._arrays = _arrays_of(self._group)
+        with _begun_passed_over():
+            self._arrays = dict(self._group.arrays())
         self._coordinates: dict[str, np.ndarray] = {}
 
     @classmethod
@@ -228,7 +232,8 @@ def open_study(path: str | Path) -> xarray.Dataset:
     """
     xr = optional_package("xarray", "a study", "studies")
     StudyFile(path)
-    found = xr.open_zarr(str(path), consolidated=False, chunks=None).load()
+    with _begun_passed_over():
+        found = xr.open_zarr(str(path), consolidated=False, chunks=None).load()
     names = json.loads(found.attrs["variables"])
     return found.set_coords([name for name in ("case", *names) if name in found])
 

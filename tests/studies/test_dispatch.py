@@ -18,7 +18,7 @@ pytestmark = extras.of_file("dask")
 import distributed
 
 from hybrid.errors import ResultError
-from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
+from hybrid.store.study_file import DONE, FAILED, Column, StudyFile, open_study
 from hybrid.studies import dispatch
 from hybrid.studies.workers import Job, Outcome, Variable
 
@@ -176,8 +176,14 @@ def test_what_a_batch_is_decides_nothing(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_study_is_opened_while_a_file_of_it_is_written(tmp_path: Path) -> None:
-    """What a writer has begun, or a killed one has left, is passed over without a warning."""
+    """What a writer has begun, or a killed one has left, is passed over without a warning, and is written anew."""
     column = Column("", "", (), np.arange(CASES, dtype=float))
-    file = StudyFile.create(tmp_path / "s.zarr", {"x": column}, CASES, BATCH, {})
+    file = StudyFile.create(tmp_path / "s.zarr", {"x": column}, CASES, BATCH, {"variables": '["x"]'})
     (tmp_path / "s.zarr" / "zarr.8c1e87.partial").write_bytes(b"{")
-    assert np.array_equal(StudyFile(tmp_path / "s.zarr").status, file.status)
+    (tmp_path / "s.zarr" / "force_max").mkdir()
+    again = StudyFile(tmp_path / "s.zarr")
+    assert np.array_equal(again.status, file.status) and "force_max" not in again
+    assert "force_max" not in open_study(tmp_path / "s.zarr")
+    ones = np.ones(BATCH)
+    again.add(0, {"force_max": Column("N", "", (), ones), "status": Column("", "", (), DONE * ones)}, {})
+    assert np.array_equal(open_study(tmp_path / "s.zarr").force_max[:BATCH], ones)
