@@ -18,7 +18,7 @@ from derivative_scenes import KINDS, keys_of, scene_at_rest
 
 import hybrid
 from hybrid.designs.network_at_rest import Places, at_rest
-from hybrid.designs.numbers import with_number
+from hybrid.designs.numbers_and_results import with_number
 from hybrid.scene.read import as_scene
 from tests.designs.test_body_derivatives import SCENES as SCENES_OF_BODIES
 

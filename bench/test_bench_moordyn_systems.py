@@ -20,9 +20,9 @@ from peers.moordyn_deck import march, options, segments
 from peers.moordyn_systems import DECKS
 
 import hybrid
-from hybrid.interop.moordyn.bodies import rotation_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
+from hybrid.interop.moordyn.tables import rotation_of
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_tables import Motion
 

@@ -22,7 +22,7 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.run import Run
 from hybrid.simulation.run_zones import RunZones
-from hybrid.zones import at_start
+from hybrid.zones import change as zone_changes
 from hybrid.zones.manager import DomainManager
 
 pytestmark = pytest.mark.bench
@@ -95,7 +95,7 @@ def four_lines() -> Text:
 
 def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each line that changes, what follows for all of them included; the outputs that it has to write before apart."""
-    monkeypatch.setattr(at_start, "shares_asked", lambda *_: {CURVATURE: SHARE})
+    monkeypatch.setattr(zone_changes, "shares_asked", lambda *_: {CURVATURE: SHARE})
     written, changing, attaching, change = list[float](), list[float](), list[float](), RunZones.after_step
 
     def without_outputs(zones: RunZones) -> None:

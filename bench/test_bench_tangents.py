@@ -19,10 +19,9 @@ from derivative_scenes import KINDS, keys_of, scene_at_anchor, scene_in_motion
 import hybrid
 from hybrid.designs import in_motion as way
 from hybrid.designs.in_motion import Motion, by_tangents, size_of
-from hybrid.designs.numbers import changed_scene, number_of
+from hybrid.designs.numbers_and_results import changed_scene, number_of, parse_wanted
 from hybrid.designs.replay import Course, course_of, replay
 from hybrid.designs.tangents import Unfollowed
-from hybrid.designs.wanted import parse_wanted
 
 pytestmark = pytest.mark.bench
 SCENES, ROUNDS = int(os.environ.get("SCENES", "200")), 3

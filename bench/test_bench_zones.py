@@ -24,7 +24,7 @@ import pytest
 import hybrid
 from hybrid.errors import ZONE_EVENTS
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.zones import at_start
+from hybrid.zones import change as zone_changes
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -63,13 +63,13 @@ def touchdown(space: bool) -> Text:
 def run(text: Text, mesh: Text, model: Text, share: float | None = None) -> hybrid.Result:
     """share: of curvature, as an accuracy asks for it, but without its runs to compare with."""
     scene = hybrid.validate_scene(copy.deepcopy(text) | {"mesh": mesh, "model": model})
-    asked = at_start.shares_asked
+    asked = zone_changes.shares_asked
     if share is not None:
-        at_start.shares_asked = lambda *_: {CURVATURE: share}
+        zone_changes.shares_asked = lambda *_: {CURVATURE: share}
     try:
         return hybrid.run(scene)
     finally:
-        at_start.shares_asked = asked
+        zone_changes.shares_asked = asked
 
 
 def per_step(result: hybrid.Result) -> float:

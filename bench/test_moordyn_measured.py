@@ -150,7 +150,7 @@ def test_a_point_is_lifted_by_its_volume_above_the_surface_too(z: float, tmp_pat
 
 
 def test_a_body_turns_by_degrees_about_x_then_y_then_z(tmp_path: Path) -> None:
-    from hybrid.interop.moordyn.cables import _rotated
+    from hybrid.interop.moordyn.tables import _rotated
 
     with network(tmp_path) as (made, _):
         place = np.array(moordyn.GetPointPos(moordyn.GetPoint(made, 3))) - [0, 0, -10]

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from hybrid.couple.fmu_export import export_fmu
     from hybrid.designs.design import design, openmdao_component
     from hybrid.designs.nearest import seek
-    from hybrid.designs.sensitivity import sensitivity
-    from hybrid.designs.shares import shares
+    from hybrid.designs.sensitivity import sensitivity, shares
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map, plot_zones
     from hybrid.view.quantities import plot_summary as plot
     from hybrid.view.report import write_report as report
-    from hybrid.zones.criteria import NodeState
+    from hybrid.zones.manager import NodeState
 
 # Public names by the file that has them, and what those are called there that have another name.
 _FILES = {
@@ -57,8 +56,7 @@ _FILES = {
     "couple.fmu_export": ("export_fmu",),
     "designs.design": ("design", "openmdao_component"),
     "designs.nearest": ("seek",),
-    "designs.sensitivity": ("sensitivity",),
-    "designs.shares": ("shares",),
+    "designs.sensitivity": ("sensitivity", "shares"),
     "errors": ("ComputationError", "HybridError", "Outcome", "ResultError", "SceneError"),
     "exports.api": ("export",),
     "interop.moordyn": ("export_moordyn", "import_moordyn"),
@@ -77,7 +75,7 @@ _FILES = {
     "view.notebook": ("plot_space",),
     "view.quantities": ("plot", "plot_energy", "plot_quantity", "plot_shape", "plot_zone_map", "plot_zones"),
     "view.report": ("report",),
-    "zones.criteria": ("NodeState",),
+    "zones.manager": ("NodeState",),
 }
 _THERE = {
     "open": "open_result",

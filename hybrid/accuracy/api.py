@@ -30,7 +30,7 @@ from hybrid.simulation.restart import remaining
 from hybrid.store.format import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
-from hybrid.zones.criteria import UserCriterion
+from hybrid.zones.manager import UserCriterion
 
 # Why there is nothing that a criterion could ask for.
 NO_ZONES = "a criterion is for zones that move: the scene's model is not adaptive"

@@ -50,8 +50,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.mesh_survey import CELLS, STEPS, Survey, lack_along, layered, shown, with_survey
 from hybrid.simulation.run_sample import END_FORCES, NOT_ESTIMATED, RIGHT, RunSample, Samples
-from hybrid.zones.at_start import HOLD
-from hybrid.zones.change import LONGEST_IN_RAMP, READY
+from hybrid.zones.change import HOLD, LONGEST_IN_RAMP, READY
 
 Stretches = Collection[tuple[float, float]]  # m, of s
 ROD_CELLS = 4.0  # of rods to a length sqrt(EI/T) beside point loads and clamps: the curvature there is 1 % off
@@ -60,7 +59,7 @@ ROD_CELLS = 4.0  # of rods to a length sqrt(EI/T) beside point loads and clamps:
 class _EndCell(NamedTuple):
     """Outputs within a cell at an end: a rod and a catenary are drawn there each in its own way.
 
-    How far each is off is an error of cells (outputs.edge_errors).
+    How far each is off is an error of cells (outputs.probes).
     """
 
     within: np.ndarray  # their numbers

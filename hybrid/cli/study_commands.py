@@ -241,7 +241,7 @@ def sensitivity(
 
 def _results(scene: Scene, motion: bool) -> list[str]:
     """What engineers ask first."""
-    from hybrid.designs.wanted import of_line
+    from hybrid.designs.numbers_and_results import of_line
 
     tensions = [f"{of_line(x)}tension@{end}" for x in scene.asked_lines for end in ("start", "end")]
     if motion:

@@ -16,10 +16,9 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.all_lines import JOINTS, scene_of_lines
-from hybrid.interop.moordyn.bodies import rotation_of
-from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
+from hybrid.interop.moordyn.tables import chain_of, rotation_of
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import frame_of
 from hybrid.scene.analysis import CatenaryModel

@@ -17,10 +17,9 @@ import numpy as np
 
 from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, Motion, followed, size_of
 from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places, at_rest
-from hybrid.designs.numbers import number_of, scene_with
+from hybrid.designs.numbers_and_results import number_of, parse_wanted, scene_with
 from hybrid.designs.replay import Course, course_of
 from hybrid.designs.tangents import Unfollowed, has_two_sides, step_of
-from hybrid.designs.wanted import parse_wanted
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.root import Scene

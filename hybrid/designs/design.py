@@ -14,7 +14,7 @@ from hybrid.designs.case_results import FINER, IN_MOTION, AnyScene, Equilibria, 
 from hybrid.designs.identify import Apart, Estimate, Measurements, fit, measurements, quantity_of
 from hybrid.designs.in_motion import refuse_edges
 from hybrid.designs.nearest import Space
-from hybrid.designs.numbers import scene_with, text_of_found
+from hybrid.designs.numbers_and_results import scene_with, text_of_found
 from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import (
     NOTHING,

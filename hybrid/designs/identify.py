@@ -16,8 +16,8 @@ from scipy.stats import chi2, norm, t
 from hybrid.designs.case_results import FINER, IN_MOTION, AnyScene, Equilibria, Point
 from hybrid.designs.in_motion import NAMES as EDGES
 from hybrid.designs.nearest import Rows, Space, nearest
+from hybrid.designs.numbers_and_results import of_line
 from hybrid.designs.problem import cable_of
-from hybrid.designs.wanted import of_line
 from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES

@@ -22,10 +22,20 @@ from numpy.typing import NDArray
 
 from hybrid.designs.line_at_rest import LineAtRest
 from hybrid.designs.network_at_rest import NetworkAtRest
-from hybrid.designs.numbers import at_a_bound, changed_scene, number_of, scene_with, size_of
+from hybrid.designs.numbers_and_results import (
+    Wanted,
+    at_a_bound,
+    changed_scene,
+    number_of,
+    over_time,
+    parse_wanted,
+    peaks,
+    scene_with,
+    size_of,
+    smoothed,
+)
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
 from hybrid.designs.tangents import NetworkOthers, Seen, Unfollowed, has_two_sides, step_of
-from hybrid.designs.wanted import Wanted, over_time, parse_wanted, peaks, smoothed
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.state.state import Floats

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from hybrid.designs.case_results import Equilibria, Point
-from hybrid.designs.numbers import number_of
+from hybrid.designs.numbers_and_results import number_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.read import SceneLike, as_scene

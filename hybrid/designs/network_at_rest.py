@@ -40,8 +40,15 @@ from hybrid.designs.line_at_rest import (
     at_rest_alone,
     moment_on_body,
 )
-from hybrid.designs.numbers import at_a_bound, number_in, number_of, step_at_rest, with_number
-from hybrid.designs.wanted import Wanted, parse_wanted
+from hybrid.designs.numbers_and_results import (
+    Wanted,
+    at_a_bound,
+    number_in,
+    number_of,
+    parse_wanted,
+    step_at_rest,
+    with_number,
+)
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V

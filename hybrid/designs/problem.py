@@ -16,9 +16,8 @@ import numpy as np
 from hybrid.designs.case_results import IN_MOTION, AnyScene, Equilibria, Point
 from hybrid.designs.in_motion import is_edge
 from hybrid.designs.nearest import Space
-from hybrid.designs.numbers import PART as KEY_PART
-from hybrid.designs.numbers import computing, number_of, unit_of_key
-from hybrid.designs.wanted import of_line
+from hybrid.designs.numbers_and_results import PART as KEY_PART
+from hybrid.designs.numbers_and_results import computing, number_of, of_line, unit_of_key
 from hybrid.errors import SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES

@@ -67,7 +67,7 @@ from hybrid.kernels.watch.tangents import (
 )
 from hybrid.model.build import Model, in_space, planar
 from hybrid.model.ends import table_of_loads
-from hybrid.model.failure import weaknesses
+from hybrid.model.nearby import weaknesses
 from hybrid.model.network import NetworkModel, NetworkResolution, build_network
 from hybrid.model.resolution import Resolution
 from hybrid.scene.network import Network

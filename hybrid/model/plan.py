@@ -57,7 +57,7 @@ NEARLY_SLACK = 0.05
 DISTURBED, WIDER = 4.0, 2.0
 MOST_RANGES = 4  # places of rods that are named
 VISIBLY = 1.05  # times the steps of rods that are named
-# Part of what a catenary may lack along the line from which on zones that move are rod (zones.at_start).
+# Part of what a catenary may lack along the line from which on zones that move are rod (zones.change).
 ZONES_ALONG = 0.5
 
 

@@ -6,32 +6,49 @@ cells, moments and curvatures from the nodes, zone by zone.
 
 Arrays have the node, cell or output point first, then the component, and the nb outputs of the batch last: one numpy
 operation and one product with a sparse matrix (output_grid) serve the batch.
+
+A line whose cells are others in each output is observed as lines one behind the other.  Between two of these lies a
+cell without length that belongs to none.  Arrays along all of them have one column; what there is one of in each output
+(ends, energies) has the outputs last, as in any `Observation`.
+
+Forces on obstacles, energy stored in them, and where those are that move, are by the law of kernels.laws.obstacles at
+the positions and velocities of outputs: without friction, and of obstacles that move without damping, whose velocities
+outputs do not have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.contact.self_contact_law import FIRST, INNER, LAST, OUTER, WITHIN
+from hybrid.kernels.contact.self_contact_pairs import WINDOW, Contact
+from hybrid.kernels.contact.self_distance import NEIGHBOURS
+from hybrid.kernels.laws.obstacles import put_obstacles
 from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.kernels.state.report import (
     CONTACT_FORCE,
+    DAMPING,
+    FIXED,
     FORCE_A,
     LENGTH_OUT,
     PAYOUT_POWER,
     SEABED_ENERGY,
+    SEEN_FORCE,
+    SEEN_MOMENT,
+    SEEN_TURN,
     SELF_CONTACT_ENERGY,
     SOIL,
     STRETCH_ENERGY,
 )
-from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line
+from hybrid.kernels.state.state import ALONG_LINE, NO_TURN, NODES_OF_LINE, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import (
     ACROSS,
     BORNE,
@@ -39,12 +56,28 @@ from hybrid.kernels.watch.observed_outputs import (
     EDGES,
     GROUNDED,
     NATURAL,
+    ON_OBSTACLE,
     PLACES,
     SIDE_TORQUE,
     TWIST,
     UNKNOWN,
+    Found,
+    observed_joined,
 )
-from hybrid.outputs.observed_states import ObservedStates, cross, last, means_beside, means_on_line, size
+from hybrid.model.bodies import angles_of
+from hybrid.model.mesh import Zone
+from hybrid.outputs.observed_states import (
+    Grid,
+    ObservedStates,
+    Rows,
+    cross,
+    last,
+    linear,
+    means_beside,
+    means_on_line,
+    size,
+)
+from hybrid.store.format import Field
 
 
 def links(batch: Batch, line: Line) -> Floats:
@@ -253,3 +286,405 @@ class Touchdown(NamedTuple):
     edges: Floats  # (2, nb) m, arc lengths of the first and the last point in contact
     places: Floats  # (2, 3, nb) m, where they are
     grounded: Floats  # (nb,) m, length in contact
+
+
+# --- lines whose cells are others in each output -----------------------------------------------
+
+# What a batch has of the nodes and of the cells; the rest is of each output as it is.
+NODES_OF_BATCH, CELLS_OF_BATCH = ("r", "v", "vd"), ("e", "T", "a1", "w")
+OF_LINE = ("h", "kb")
+
+
+class Output(NamedTuple):
+    """One output with the line that it is of, in arrays of their own."""
+
+    line: Line
+    zones: tuple[Zone, ...]
+    batch: Batch  # of this output alone
+
+
+def outputs_in(batch: Batch, line: Line, zones: tuple[Zone, ...]) -> list[Output]:
+    """The outputs of a batch of one line, copied."""
+    found = []
+    arrays: dict[str, Any] = {name: getattr(line, name).copy() for name in ALONG_LINE if name not in OF_LINE}
+    for k in range(batch.t.size):
+        own: dict[str, Any] = {name: getattr(batch, name)[k].copy() for name in OF_LINE}
+        rows: Any = [x[k : k + 1].copy() for x in batch]
+        found.append(Output(line._replace(**arrays, **own), zones, Batch(*rows)))
+    return found
+
+
+def _joined(parts: Sequence[Floats], gaps: bool) -> Floats:
+    """One behind the other; gaps: with the last row again after each but the last, for a cell that belongs to none."""
+    if gaps:
+        parts = [x for part in parts for x in (part, part[-1:])][:-1]
+    return np.concatenate(parts)
+
+
+class JoinedGrid(Grid):
+    """Grids of several lines, one behind the other."""
+
+    def __init__(self, grids: Sequence[Grid]) -> None:
+        first, self.of = grids[0], grids
+        self.loads, self.changes, self.after, self._kept = first.loads, first.changes, first.after, first._kept
+        self.hinges = grids[0].hinges
+        self.begin = np.cumsum([0, *(grid._x.size for grid in grids)])  # nodes before each line
+        self.rows = sides = np.cumsum([0, *(len(grid.side_nodes) for grid in grids)])  # likewise sides
+        self.parts = tuple(part for grid in grids for part in grid.parts)
+        self.spans = []
+        for grid, n, o in zip(grids, self.begin.tolist(), sides.tolist(), strict=False):
+            self.spans += [(a + n, b + n, c + o) for a, b, c in grid.spans]
+        before = np.repeat(self.begin[:-1], np.diff(sides))
+        self.side_nodes = np.concatenate([grid.side_nodes for grid in grids]) + before
+        self.s, self._x = (np.concatenate([getattr(grid, name) for grid in grids]) for name in ("s", "_x"))
+        points = [grid.s.size for grid in grids]
+        self._before = np.repeat(self.begin[:-1], points)  # (ns,) of each point: nodes before its line
+        self._sides_before, self._lines_before = np.repeat(sides[:-1], points), np.repeat(np.arange(len(grids)), points)
+        self._stretch = np.concatenate([grid._stretch for grid in grids])
+        self._first = np.concatenate([grid._first for grid in grids]) + self._before
+        self._last = np.concatenate([grid._last for grid in grids]) + self._before
+
+    def of_line_of(self, node: int) -> NDArray[np.bool_]:
+        return np.asarray(self._before == self.begin[np.searchsorted(self.begin, node, "right") - 1])
+
+    @property
+    def in_catenary(self) -> NDArray[np.bool_]:
+        return np.concatenate([grid.in_catenary for grid in self.of])
+
+    @cached_property
+    def chords(self) -> Rows:
+        return linear(self._x, self.s, self._before, np.repeat(self.begin[1:] - 1, [grid.s.size for grid in self.of]))
+
+    @cached_property
+    def held(self) -> Rows:
+        before = self._before + self._lines_before  # each line before has one column more than nodes
+        if any(b - a == 1 for a, b, _ in self.spans):  # where values beside a stretch may count
+            at = np.concatenate([grid._held_at for grid in self.of])
+            start, end = (np.concatenate(x) for x in zip(*(grid._held_between for grid in self.of), strict=True))
+            return linear(at, self.s, start + before, end + before)
+        x, first, last, lines = self._x, self.begin[:-1], self.begin[1:] - 1, np.arange(len(self.of))
+        at = np.empty(x.size + lines.size)
+        middle = 0.5 * (x[:-1] + x[1:])  # those between two lines are overwritten
+        at[np.arange(x.size - 1) + np.repeat(lines, np.diff(self.begin))[:-1] + 1] = middle
+        at[first + lines], at[last + lines + 1] = x[first], x[last]
+        of = self._lines_before
+        start = np.where(self.s < middle[first][of], first[of], self._first + 1) + of
+        end = np.where(self.s > middle[last - 1][of], last[of] + 1, self._last) + of
+        return linear(at, self.s, start, end)
+
+    @cached_property
+    def sides(self) -> Rows:
+        shift = self._stretch + self._sides_before - self._before
+        return linear(self._x, self.s, self._first, self._last, shift)
+
+
+class JoinedObservation(Observation):
+    """Outputs of several lines."""
+
+    def __init__(self, outputs: Sequence[Output], sea: Sea, grid: JoinedGrid) -> None:
+        lines, batches = [x.line for x in outputs], [x.batch for x in outputs]
+        along: dict[str, Any] = {
+            name: _joined([getattr(x, name) for x in lines], name not in NODES_OF_LINE) for name in ALONG_LINE
+        }
+        along["h"][grid.begin[1:-1] - 1] = 0.0
+        nodes = (*NODES_OF_BATCH, "soil") if batches[0].soil.size else NODES_OF_BATCH
+        of: dict[str, Any] = {name: _joined([getattr(x, name)[0] for x in batches], False)[None] for name in nodes}
+        of |= {name: _joined([getattr(x, name)[0] for x in batches], True)[None] for name in CELLS_OF_BATCH}
+        rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch")]
+        heads: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}
+        super().__init__(lines[0]._replace(**along), sea, grid, Batch(**heads, **of))
+        self.outputs, self.begin, self._joined_grid = outputs, grid.begin, grid
+
+    @property
+    def columns(self) -> int:
+        return 1
+
+    @cached_property
+    def changes(self) -> list[int]:
+        pairs = zip(self.outputs, self.begin.tolist(), strict=False)
+        return [n + int(np.argmin(np.abs(one.line.s - x))) for one, n in pairs for x in self.grid.changes]
+
+    @cached_property
+    def link(self) -> Floats:
+        return np.concatenate([links(x.batch, x.line) for x in self.outputs], axis=1)
+
+    @cached_property
+    def end_nodes(self) -> NDArray[np.int64]:
+        return np.concatenate([self.begin[:-1], self.begin[1:] - 1])
+
+    def at_end(self, x: Floats, k: int) -> Floats:
+        return np.moveaxis(x[self.begin[1:] - 1 if k else self.begin[:-1], ..., 0], 0, -1)
+
+    def outputs_last(self, x: Floats) -> Floats:
+        return x[..., None]
+
+    def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
+        if dims[:1] != ("s",):
+            return super().by_output(x, dims)
+        return np.ascontiguousarray(x[..., 0]).reshape(self.batch.t.size, -1, *x.shape[1:-1])
+
+    def has_element(self, k: int) -> NDArray[np.bool_]:
+        return self.line.element[self.begin[1:] - 1 if k else self.begin[:-1]] == 1
+
+    def _cell_at(self, point: int) -> int:
+        k, at = divmod(point, self.grid.s.size // self.batch.t.size)
+        s = self.outputs[k].line.s
+        return int(self.begin[k] + np.argmin(np.abs(0.5 * (s[:-1] + s[1:]) - self.grid.s[at])))
+
+    @cached_property
+    def _observed(self) -> Found:
+        return observed_joined(self.line, self.sea, self.batch, self._along, self.begin, self._joined_grid.rows)
+
+    def _between_nodes(self) -> Floats:
+        found = self._observed.layers(self.grid.s.reshape(self.batch.t.size, -1))
+        return found.reshape(-1, 3, 1)
+
+    @property
+    def points(self) -> Floats:
+        """(ns,) m, output points of each."""
+        return self._joined_grid.of[0].s
+
+    def one(self, k: int) -> Observation:
+        """Output k as if it had been looked at alone."""
+        found = self.outputs[k]
+        return Observation(found.line, self.sea, self._joined_grid.of[k], found.batch)
+
+
+# --- obstacles ---------------------------------------------------------------------------------
+
+Integers = NDArray[np.int64]
+
+
+def obstacle_force_fields(names: Sequence[str]) -> list[Field]:
+    """What is recorded of each obstacle."""
+    found = []
+    for name in names:
+        at, of = f"obstacles/{name}", f"obstacle {name}, without friction"
+        text = f"resultant of the normal forces of the line on {of}"
+        found.append(Field(f"{at}/normal_force", "N", text, (3,), ("xyz",), "inertial"))
+        found.append(Field(f"{at}/contact_force", "N", f"sum of the normal forces of the line on {of}"))
+        found.append(Field(f"{at}/contact", "N/m", f"largest normal force per length of the line on {of}"))
+        found.append(Field(f"{at}/energy", "J", f"energy stored in the contact with obstacle {name}"))
+    return found
+
+
+def obstacle_force_values(names: Sequence[str], seen: Observation) -> dict[str, Floats]:
+    """Their values (nb, ...)."""
+    found: dict[str, Floats] = {}
+    if not names:
+        return found
+    sea, moved, places = seen.sea, seen.line.moved, seen.batch.obstacles
+    rows = sea.obstacles.copy()
+    if moved.size:
+        rows[moved != FIXED, DAMPING] = 0.0
+    out = np.empty((seen.batch.t.size, len(names), ON_OBSTACLE))
+    if not places.size:
+        seen.press_obstacles(sea._replace(obstacles=rows), slice(None), out)
+    for k in range(len(places) if places.size else 0):
+        put_obstacles(rows, sea.carried, places[k])
+        seen.press_obstacles(sea._replace(obstacles=rows), slice(k, k + 1), out)
+    for k, name in enumerate(names):
+        found[f"obstacles/{name}/normal_force"] = out[:, k, :3].copy()
+        for at, key in enumerate(("contact_force", "contact", "energy")):
+            found[f"obstacles/{name}/{key}"] = out[:, k, 3 + at].copy()
+    return found
+
+
+def obstacle_fields(names: Sequence[str]) -> list[Field]:
+    """Place and rotation of all obstacles, force and moment on them."""
+    texts = {
+        "position": ("m", "place of obstacle {}"),
+        "rotation": ("deg", "rotation of obstacle {} since t = 0: roll, pitch, yaw, about x, then y, then z"),
+        "force": ("N", "force of the line on obstacle {}"),
+        "moment": ("N m", "moment of the line on obstacle {} about its place"),
+    }
+    return [
+        Field(f"obstacles/{name}/{key}", unit, text.format(name), (3,), ("xyz",), "inertial")
+        for name in names
+        for key, (unit, text) in texts.items()
+    ]
+
+
+def obstacle_values(names: Sequence[str], seen: Floats) -> dict[str, Floats]:
+    """Their values (nb, 3); seen: (nb, M, SEEN) of kernels.state.report."""
+    found = {}
+    for k, name in enumerate(names):
+        x = seen[:, k]
+        turned = x[:, SEEN_TURN:SEEN_FORCE].reshape(-1, 3, 3)
+        found[f"obstacles/{name}/position"] = x[:, :SEEN_TURN].copy()
+        found[f"obstacles/{name}/rotation"] = angles_of(turned)
+        found[f"obstacles/{name}/force"] = x[:, SEEN_FORCE:SEEN_MOMENT].copy()
+        found[f"obstacles/{name}/moment"] = x[:, SEEN_MOMENT:].copy()
+    return found
+
+
+# What two lines that touch press on each other with, and a line on itself: of one output of all of them.
+#
+# A run has the force per length of all contact at every node, with the size that its law has there
+# (kernels.contact.self_contact_pairs).  Here the same points of contact are found at the positions of an output, with a
+# law of size 1, and their forces scaled so that those of all partners add up to what nodes bear.  Friction is not in
+# it.
+
+# Points up to so many diameters apart, beyond where the law begins, count by FAINT of it: within a step positions and
+# forces lie on different curves, and what a node bears may have no point at which strands touch.
+BEYOND, FAINT = 1.15, 1e-6
+HALVINGS = 45  # of a piece, to find the foot of a point on it
+KEYS = ("force", "contact_force", "contact")
+
+
+class Lines(NamedTuple):
+    """Lines that may touch, their nodes one behind the other."""
+
+    contact: Contact
+    s: Floats  # (N+1,) m, of all nodes, as kernels.contact has them
+
+    @property
+    def lengths(self) -> Floats:
+        """(N+1,) m that the force of a node lies on."""
+        kind, s = self.contact.kind, self.s
+        nodes = np.arange(s.size)
+        return 0.5 * (s[nodes + (kind != LAST)] - s[nodes - (kind != FIRST)])
+
+
+class Points(NamedTuple):
+    """Points of contact: pieces p and q, weights of their nodes, direction of the force on p, its size."""
+
+    p: Integers
+    q: Integers
+    wp: Floats  # (n, 3)
+    wq: Floats  # (n, 3)
+    normal: Floats  # (n, 3)
+    force: Floats  # (n,)
+
+
+def pair_fields(pairs: list[tuple[str, str]]) -> list[Field]:
+    """What is recorded of pairs of lines, and of lines with themselves, by their names."""
+    found = []
+    for a, b in pairs:
+        at, of = f"contacts/{a}/{b}", f"line {b} on line {a}" if a != b else f"line {a} on itself"
+        if a != b:
+            text = f"resultant of the forces of {of}, without friction"
+            found.append(Field(f"{at}/force", "N", text, (3,), ("xyz",), "inertial"))
+        found.append(Field(f"{at}/contact_force", "N", f"sum of the forces of {of} at all places, without friction"))
+        found.append(Field(f"{at}/contact", "N/m", f"largest force per length of {of}, without friction"))
+    return found
+
+
+def pair_forces(lines: Lines, r: Floats, touch: Floats) -> dict[tuple[int, int], tuple[Floats, float, float]]:
+    """By numbers of two lines, a <= b: resultant (3,) N on a, sum N, largest force per length N/m; of those that touch.
+
+    r: (N+1, 3) m; touch: (N+1,) N/m, of all contact, at the nodes.
+    """
+    of, lengths, points = lines.contact.of, lines.lengths, points_of(lines, r, touch)
+    if not points.p.size:
+        return {}
+    at = np.concatenate([points.p[:, None] + (-1, 0, 1), points.q[:, None] + (-1, 0, 1)], axis=1)  # (n, 6) nodes
+    weights = np.concatenate([points.wp, points.wq], axis=1)
+    whole = np.bincount(at.ravel(), (weights * points.force[:, None]).ravel(), of.size)
+    share = np.divide(touch * lengths, whole, out=np.zeros(of.size), where=whole > 0.0)
+    force = points.force * 0.5 * (weights * share[at]).sum(axis=1)
+    a, b = np.minimum(of[points.p], of[points.q]), np.maximum(of[points.p], of[points.q])
+    sign, found = np.where(of[points.p] == a, 1.0, -1.0), {}
+    for pair in sorted(set(zip(a.tolist(), b.tolist(), strict=True))):
+        mine = (a == pair[0]) & (b == pair[1])
+        nodes = np.bincount(at[mine].ravel(), (weights[mine] * force[mine, None]).ravel(), of.size)
+        resultant = ((sign * force)[mine, None] * points.normal[mine]).sum(axis=0) * (pair[0] != pair[1])
+        found[pair] = resultant, float(force[mine].sum()), float((nodes / lengths).max())
+    return found
+
+
+def points_of(lines: Lines, r: Floats, touch: Floats) -> Points:
+    """Points of contact of pieces whose nodes bear a force, as kernels.contact finds them, with a law of 1 N."""
+    contact = lines.contact
+    kind, samples, width = contact.kind, contact.samples, contact.width
+    bears = touch > 0.0
+    pieces = 1 + np.flatnonzero((kind[1:-1] == WITHIN) & bears[:-2] & bears[1:-1] & bears[2:])
+    sample = np.repeat(pieces, samples[pieces])
+    first = np.repeat(np.cumsum(samples[pieces]) - samples[pieces], samples[pieces])
+    u = (np.arange(sample.size) - first + 0.5) / samples[sample]
+    wp = _weights(kind, sample, u)
+    x = np.einsum("nj,njk->nk", wp, r[sample[:, None] + (-1, 0, 1)])
+    size = np.maximum(*(np.linalg.norm(r[pieces + j] - r[pieces], axis=1) for j in (-1, 1)))
+    reach = size + BEYOND * 0.5 * (width[pieces] + width.max())
+    which, to = _near(x, r[pieces], reach)
+    may = _may_touch(lines, sample[which], pieces[to])
+    which, q = which[may], pieces[to[may]]
+    p, x, u, wp = sample[which], x[which], u[which], wp[which]
+    v, within = _feet(kind, r, q, x)
+    wq = _weights(kind, q, v)
+    away = x - np.einsum("nj,njk->nk", wq, r[q[:, None] + (-1, 0, 1)])
+    d, wide = np.linalg.norm(away, axis=1), 0.5 * (width[p] + width[q])
+    near = within & (d < BEYOND * wide)
+    a, b = _end_factors(kind, p)
+    h = np.diff(lines.s)
+    length = 0.5 * ((1.0 - u) * a * h[p - 1] + u * b * h[p]) / samples[p]
+    force = length * _push(d, wide)
+    return Points(p[near], q[near], wp[near], wq[near], (away / d[:, None])[near], force[near])
+
+
+def _near(x: Floats, middles: Floats, reach: Floats) -> tuple[Integers, Integers]:
+    """Numbers of points x (n, 3) and of middles (m, 3) of pieces that are within reach (m,) of each other, m."""
+    from scipy.spatial import cKDTree
+
+    if not len(middles):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    found = cKDTree(middles).query_ball_point(x, float(reach.max()), return_sorted=True)
+    which = np.repeat(np.arange(len(x)), [len(each) for each in found])
+    to = np.concatenate([np.asarray(each, np.int64) for each in found])
+    near = np.linalg.norm(x[which] - middles[to], axis=1) < reach[to]
+    return which[near], to[near]
+
+
+def _end_factors(kind: Integers, p: Integers) -> tuple[Floats, Floats]:
+    return np.where(kind[p - 1] == FIRST, 2.0, 1.0), np.where(kind[p + 1] == LAST, 2.0, 1.0)
+
+
+def _weights(kind: Integers, p: Integers, u: Floats) -> Floats:
+    """Weights (n, 3) of the nodes of pieces p at u."""
+    a, b = _end_factors(kind, p)
+    before, after = 0.5 * a * (1.0 - u) ** 2, 0.5 * b * u**2
+    return np.stack([before, 1.0 - before - after, after], axis=1)
+
+
+def _may_touch(lines: Lines, p: Integers, q: Integers) -> NDArray[np.bool_]:
+    """Whether pieces are no neighbours, along a line or where lines are joined, and their lines touch."""
+    contact, s = lines.contact, lines.s
+    a, b, window = contact.of[p], contact.of[q], WINDOW * 0.5 * (contact.width[p] + contact.width[q])
+    found = (contact.meets[a, b] != 0) & ((a != b) | ((np.abs(p - q) > NEIGHBOURS) & (np.abs(s[p] - s[q]) > window)))
+    for j in (0, 1):
+        for k in (0, 1):
+            m, n = contact.tips[a, j], contact.tips[b, k]
+            joined = (contact.joined[a, j] >= 0) & (contact.joined[a, j] == contact.joined[b, k])
+            joined &= (a != b) | (j != k)  # the way along a line goes from one end to the other
+            way, between = np.abs(s[p] - s[m]) + np.abs(s[q] - s[n]), np.abs(p - m) + np.abs(q - n)
+            found &= ~(joined & ~((between > NEIGHBOURS) & (way > window)))
+    return found
+
+
+def _feet(kind: Integers, r: Floats, q: Integers, x: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Where points x (n, 3) are nearest to pieces q, and whether that is no end of one from which the line goes on."""
+    a, b = _end_factors(kind, q)
+    before, after = a[:, None] * (r[q] - r[q - 1]), b[:, None] * (r[q + 1] - r[q])
+    first, bend = r[q] - 0.5 * before - x, after - before
+
+    def slope(v: Floats) -> Floats:
+        """Half the derivative of the squared distance."""
+        away, along = first + v[:, None] * before + 0.5 * v[:, None] ** 2 * bend, before + v[:, None] * bend
+        return np.einsum("nk,nk->n", away, along)
+
+    low, high = np.zeros(len(q)), np.ones(len(q))
+    begins, ends = slope(low) >= 0.0, slope(high) < 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        below = slope(middle) < 0.0
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    v = np.where(begins, 0.0, np.where(ends, 1.0, 0.5 * (low + high)))
+    return v, ~((begins & (kind[q - 1] == WITHIN)) | (~begins & ends & (kind[q + 1] == WITHIN)))
+
+
+def _push(d: Floats, width: Floats) -> Floats:
+    """Force per length, of a law of the size 1 N, at distances d (m) of strands of a mean diameter (m)."""
+    inverse = 1.0 / ((OUTER - INNER) * width)
+    x = np.maximum((d - INNER * width) * inverse, FAINT)
+    y = np.minimum(x - 1.0, 0.0)
+    return np.asarray(inverse * (2.0 * y * np.log(x) + y * y / x + FAINT * np.maximum(BEYOND - d / width, 0.0)))

@@ -33,7 +33,7 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.sections import OutputPoints, output_points
-from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors, layer_errors
+from hybrid.outputs.probes import EDGE_ERRORS, MISSED, edge_errors, layer_errors
 from hybrid.scene.network import Network
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
@@ -73,7 +73,7 @@ from hybrid.store.records import ERROR_ESTIMATE, THERE
 from hybrid.store.stored_rows import ComparisonRecorder, RowsRecorder, StoredArray, rows_path
 from hybrid.store.whole_file import LateFile
 from hybrid.store.writer import Recorder, WriteMode
-from hybrid.zones.criteria import UserCriterion, with_names
+from hybrid.zones.manager import UserCriterion, with_names
 
 # Of every step, what extremes of the end forces follow from.
 FORCES = ("t", "end_force_start", "end_force_end")

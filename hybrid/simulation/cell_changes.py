@@ -31,7 +31,7 @@ from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import kinds_of
-from hybrid.outputs.joined_lines import Output, outputs_in
+from hybrid.outputs.observation import Output, outputs_in
 from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
 from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching

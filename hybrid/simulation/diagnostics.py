@@ -43,8 +43,7 @@ from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model, as_kept
 from hybrid.model.initial_shape import HUNG
 from hybrid.model.obstacles import CELLS_PER_RADIUS
-from hybrid.outputs.joined_lines import JoinedObservation, Output
-from hybrid.outputs.observation import Observation
+from hybrid.outputs.observation import JoinedObservation, Observation, Output
 from hybrid.scene.plane import OUT
 from hybrid.simulation import watches
 from hybrid.simulation.events import (

@@ -194,7 +194,7 @@ def _compile_outputs(model: Model) -> None:
 
 
 def _compile_criteria(scene: LineScene, model: Model) -> None:
-    from hybrid.zones.at_start import manager_for
+    from hybrid.zones.change import manager_for
 
     manager = manager_for(scene, model, first_resolution(scene), None)
     manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)

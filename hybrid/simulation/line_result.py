@@ -37,8 +37,7 @@ from hybrid.model.build import Model, as_begun, planar
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import follows_curvature, wants_errors
 from hybrid.model.sections import OutputPoints, output_points, section_changes, wave_step
-from hybrid.outputs.joined_lines import Output, outputs_in
-from hybrid.outputs.observation import Observation
+from hybrid.outputs.observation import Observation, Output, outputs_in
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.schema import LineScene

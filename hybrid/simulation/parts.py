@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.run.network import SAMPLE_AXES, SAMPLE_LINES, SAMPLE_V, SAMPLE_W
 from hybrid.kernels.state.state import Batch, Floats, Line
-from hybrid.model.failure import Weakness
+from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.network_solver import NetworkSolver

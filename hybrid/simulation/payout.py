@@ -24,8 +24,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, co
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, Zone, on_other_parts
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, lengths_at, payout_of
-from hybrid.outputs.joined_lines import Output
-from hybrid.outputs.observation import Observation
+from hybrid.outputs.observation import Observation, Output
 from hybrid.outputs.probes import Observer
 from hybrid.scene.ends import SOURCES
 from hybrid.scene.schema import LineScene

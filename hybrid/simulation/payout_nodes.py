@@ -32,7 +32,7 @@ from hybrid.kernels.state.report import REMEMBERS
 from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.line import lines
-from hybrid.outputs.joined_lines import Output
+from hybrid.outputs.observation import Output
 from hybrid.simulation.remesh import NO_LAWS, PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
 from hybrid.simulation.result_file import marks_on
 

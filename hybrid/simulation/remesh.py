@@ -47,7 +47,7 @@ from hybrid.kernels.step.line_step import RUN, Task, blank_job
 from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.model.network import NetworkModel
-from hybrid.outputs.joined_lines import Output
+from hybrid.outputs.observation import Output
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.simulation.result_file import Envelope
 from hybrid.solve.contact import SelfContact

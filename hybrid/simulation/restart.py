@@ -34,8 +34,8 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.contents import passing_each_other, self_reach
 from hybrid.model.ends import EndConditions
-from hybrid.model.failure import Weakness
 from hybrid.model.mesh import MOST_CELLS, Grading, Layout
+from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import Resolution, first_resolution
@@ -49,7 +49,7 @@ from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.integrity import Tree, matched, pack
 from hybrid.store.reader import Result, open_result
-from hybrid.zones.criteria import UserCriterion
+from hybrid.zones.manager import UserCriterion
 
 FIRST_WORKS = 11  # works that were booked once
 FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these

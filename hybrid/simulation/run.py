@@ -16,7 +16,7 @@ import numpy as np
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import state_for
-from hybrid.model.failure import Weakness
+from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkModel, NetworkResolution, build_network
 from hybrid.model.plan import SAME_STOP, apart, equal_steps, falls_on, output_times
 from hybrid.scene.motion_checks import ramp_ends
@@ -45,8 +45,7 @@ from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.format import Target, Text
 from hybrid.store.hdf5_file import opened
 from hybrid.store.writer import Recorder
-from hybrid.zones.criteria import UserCriterion
-from hybrid.zones.manager import DomainManager
+from hybrid.zones.manager import DomainManager, UserCriterion
 
 if TYPE_CHECKING:  # what a run without winches does not load
     from hybrid.simulation.payout import PayingOut
@@ -87,7 +86,7 @@ class Run(RecordedRun):
         """As yet without lines, parts and a file.
 
         loop: its steps, with outputs to its end; target: None: it is only to be compared with; criterion: one more for
-        zones that move (zones.criteria); kept: whether it writes checkpoints.
+        zones that move (zones.manager); kept: whether it writes checkpoints.
         """
         self.network, self.model, self.state, self.found = first.network, first.model, first.state, first.found
         self.scenes, self.resolution = first.scenes, first.model.resolution
@@ -448,7 +447,7 @@ def new_run(
 
     target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
     motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks for, or the
-    checkpoint says; criterion: one more for zones that move (zones.criteria); changes: loads and motions of these
+    checkpoint says; criterion: one more for zones that move (zones.manager); changes: loads and motions of these
     networks hold from some time on.
     """
     end = (recording.until or network.require_time().duration) if moves else 0.0

@@ -21,7 +21,7 @@ from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import NO_TURN, State
 from hybrid.kernels.step.accept import MANY, TINY
 from hybrid.model.build import Model
-from hybrid.model.failure import Weakness, after_failure, weaknesses
+from hybrid.model.nearby import Weakness, after_failure, weaknesses
 from hybrid.simulation.events import energy_gains_text, slack_remedy
 from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.parts import Part

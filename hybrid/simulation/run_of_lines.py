@@ -22,7 +22,7 @@ from hybrid.kernels.state.state import Floats, Line, Moves, Work
 from hybrid.model.build import Model
 from hybrid.model.contents import touching
 from hybrid.model.ends import table_of_loads
-from hybrid.model.failure import unclamped, without_hold
+from hybrid.model.nearby import unclamped, without_hold
 from hybrid.model.network import NetworkModel, NetworkResolution, build_network
 from hybrid.scene.base import Table
 from hybrid.scene.network import Network
@@ -44,7 +44,7 @@ from hybrid.store.format import Target
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
-from hybrid.zones.criteria import UserCriterion
+from hybrid.zones.manager import UserCriterion
 
 AnyRecorder = Recorder | ComparisonRecorder
 

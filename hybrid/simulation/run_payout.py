@@ -32,8 +32,7 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState
-from hybrid.zones.at_start import rods_at_winch
-from hybrid.zones.change import ZoneSwitching, change_base
+from hybrid.zones.change import ZoneSwitching, change_base, rods_at_winch
 from hybrid.zones.manager import Change, DomainManager, Reason
 
 # Nodes by which cells are merged before the one leaves at which they must be whole: merged then, where the reel still

@@ -23,8 +23,7 @@ from hybrid.model.bodies import angles_of
 from hybrid.model.network import NetworkModel, build_network
 from hybrid.model.plan import with_models
 from hybrid.model.resolution import model_is_free
-from hybrid.outputs.observation import Probe
-from hybrid.outputs.obstacle_forces import KEYS, Lines, pair_fields, pair_forces
+from hybrid.outputs.observation import KEYS, Lines, Probe, pair_fields, pair_forces
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.outputs.quantities import Quantities, StepQuantities
 from hybrid.scene.bodies import FreeBody

@@ -23,7 +23,7 @@ from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE, Floats
-from hybrid.model.failure import weaknesses
+from hybrid.model.nearby import weaknesses
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.network import Network
 from hybrid.scene.points import Fairlead
@@ -69,7 +69,7 @@ from hybrid.store.recorder import Rows
 from hybrid.store.records import PENDING, RODS_AT_START
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
-from hybrid.zones.at_start import reasons_at_start
+from hybrid.zones.change import reasons_at_start
 from hybrid.zones.manager import DomainManager
 
 

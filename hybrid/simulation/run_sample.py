@@ -79,8 +79,8 @@ class RunSample:
     touches: bool = False  # of a result: whether the line touched itself; of others: whether contact was computed
     # Numbers of the output points at which its values along the line are (`compared_places`); in no checkpoint.
     places: np.ndarray = field(default_factory=lambda: ALL)
-    # of a result: errors (nt, ns) by its cells beside edges of contact (outputs.edge_errors), of an equilibrium beside
-    # its ends, joints and loads as well (outputs.edge_errors)
+    # of a result: errors (nt, ns) by its cells beside edges of contact (outputs.probes), of an equilibrium beside
+    # its ends, joints and loads as well (outputs.probes)
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
     # what limits are held against, of all steps (store.limits.extremes_about); {}: the scene has no limits
     extremes: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -22,7 +22,7 @@ from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.step_control import before_fixed, weights
 from hybrid.model.build import Model
 from hybrid.model.ends import STILL, DrivenEnd, EndConditions, contradictions, rotation_vector
-from hybrid.model.failure import Weakness
+from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.scene.base import dotted
 from hybrid.scene.network import Network

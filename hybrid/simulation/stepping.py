@@ -47,7 +47,7 @@ from hybrid.store.format import MemoryTarget
 from hybrid.store.hdf5_file import check_target, locked
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.recorder import Mark
-from hybrid.zones.criteria import UserCriterion
+from hybrid.zones.manager import UserCriterion
 
 # s of the wall, after which the time of the processor is read again: to read it may take as long as ten steps.
 READ_OUTSIDE = 1.0

@@ -20,7 +20,7 @@ from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.report import AXIS, GROOVE, INERTIA, KIND, PLACE, RATE, RIM, RING, SHEAVE, SOIL, STRAND
 from hybrid.kernels.state.state import Batch, Floats, Sea, ends_in, state_in
 from hybrid.model.build import Model
-from hybrid.outputs.joined_lines import Output
+from hybrid.outputs.observation import Output
 from hybrid.simulation.events import EventLog
 from hybrid.solve.flaws import TOUCHING
 from hybrid.solve.stability import is_stable

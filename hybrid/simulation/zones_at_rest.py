@@ -21,18 +21,17 @@ from hybrid.simulation.equilibrium import equilibrium_of, joined_lines, solve_fr
 from hybrid.simulation.run_start import nearness_in
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.stepper import NetworkState
-from hybrid.zones.at_start import (
+from hybrid.zones.change import (
     MOST_ROUNDS,
     STRICTER,
     manager_for,
     on_fewer,
+    on_layout,
     planned_cells,
     with_fewer_cells,
     zones_without_equilibrium,
 )
-from hybrid.zones.change import on_layout
-from hybrid.zones.criteria import UserCriterion, of_line
-from hybrid.zones.manager import DomainManager
+from hybrid.zones.manager import DomainManager, UserCriterion, of_line
 
 Rest = tuple[NetworkModel, LinesAtRest]
 
@@ -139,7 +138,7 @@ def start_at_rest(
 def _zones_at_rest(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """Zones for the equilibrium of a network whose lines with managers are all rod: rod only where it is needed.
 
-    As of one cable (zones.at_start): where the two equilibria are further apart than the tolerance of a line
+    As of one cable (zones.change): where the two equilibria are further apart than the tolerance of a line
     criteria become stricter, and where that does not help zones stay rod.
     """
     allowed = {k: float(manager.zones.clock.tolerance) for k, manager in managers.items()}

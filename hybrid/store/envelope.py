@@ -277,7 +277,7 @@ def largest_contact(result: StoredResult) -> tuple[str, Extreme] | None:
 
 # What presses on a line by its name: obstacles, other lines, the line itself, and with what force.
 #
-# Outputs have the forces by partner (outputs.obstacle_forces), without friction.  The envelope has
+# Outputs have the forces by partner (outputs.observation), without friction.  The envelope has
 # the largest force per length of every step by kind of partner alone; the name is found at the outputs beside it.
 # Where contact began by itself, outputs have no such forces, and partners are those that events name.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.designs.network_at_rest import NetworkAtRest, at_rest
-from hybrid.designs.numbers import changed_scene
+from hybrid.designs.numbers_and_results import changed_scene
 from hybrid.scene.read import as_scene
 
 

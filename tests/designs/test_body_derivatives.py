@@ -8,7 +8,7 @@ import pytest
 import hybrid
 from hybrid.designs import network_at_rest
 from hybrid.designs.network_at_rest import at_rest
-from hybrid.designs.numbers import with_number
+from hybrid.designs.numbers_and_results import with_number
 from hybrid.model.nearby import seats_know_no_shape, shaped_anew
 from hybrid.model.network import NetworkResolution, bodies_of, build_network
 from hybrid.scene.read import as_scene

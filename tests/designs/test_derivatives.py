@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.designs.network_at_rest import at_rest
-from hybrid.designs.numbers import allowed, changed_scene, number_of, with_number
+from hybrid.designs.numbers_and_results import allowed, changed_scene, number_of, with_number
 from hybrid.errors import SceneError
 from hybrid.scene.base import Invalid
 from hybrid.scene.read import as_scene

@@ -8,8 +8,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.designs.case_results import PART, TANGENT, Motions, Peaks
-from hybrid.designs.numbers import scene_with
-from hybrid.designs.wanted import over_time, peaks, smoothed
+from hybrid.designs.numbers_and_results import over_time, peaks, scene_with, smoothed
 from tests.designs.test_in_motion import G, W, heaved, on_the_bed
 from tests.scenes import cable_scene
 

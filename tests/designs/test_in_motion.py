@@ -13,10 +13,9 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.designs.in_motion import Motion, in_motion
-from hybrid.designs.numbers import changed_scene, number_of
+from hybrid.designs.numbers_and_results import changed_scene, number_of, parse_wanted
 from hybrid.designs.replay import course_of, replay
 from hybrid.designs.tangents import Unfollowed
-from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import in_full

@@ -10,9 +10,8 @@ import pytest
 
 from hybrid.designs import in_motion as way
 from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, by_differences, by_tangents, in_motion
-from hybrid.designs.numbers import number_of, size_of
+from hybrid.designs.numbers_and_results import number_of, parse_wanted, size_of
 from hybrid.designs.replay import course_of
-from hybrid.designs.wanted import parse_wanted
 from hybrid.scene.read import as_scene
 
 SECTION = {

@@ -17,10 +17,9 @@ from hybrid.designs.in_motion import (
     in_motion,
     size_of,
 )
-from hybrid.designs.numbers import changed_scene, number_of
+from hybrid.designs.numbers_and_results import changed_scene, number_of, parse_wanted
 from hybrid.designs.replay import course_of
 from hybrid.designs.tangents import NetworkOthers, Unfollowed
-from hybrid.designs.wanted import parse_wanted
 from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
 from tests.designs.test_system_tangents import asked_of

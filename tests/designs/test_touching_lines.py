@@ -8,7 +8,7 @@ import pytest
 
 import hybrid
 from hybrid.designs.network_at_rest import at_rest
-from hybrid.designs.numbers import changed_scene
+from hybrid.designs.numbers_and_results import changed_scene
 from hybrid.scene.read import as_scene
 from tests.designs.differences import agree
 from tests.validation.test_validation_lines_contact import crossing

@@ -16,7 +16,7 @@ from peers.adapters.interface import line_of
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.interop.moordyn import ImportedScene
-from hybrid.interop.moordyn.cables import _rotated
+from hybrid.interop.moordyn.tables import _rotated
 from hybrid.scene.ends import Body, Clamped, Free, Pinned
 from hybrid.scene.root import Scene
 from tests.scenes import cable_scene, pinned_at

@@ -13,8 +13,7 @@ from test_moordyn_refusals import mutated
 
 import hybrid
 from hybrid.interop.moordyn import import_moordyn
-from hybrid.interop.moordyn.bodies import angles_of, rotation_of
-from hybrid.interop.moordyn.cables import _rotated
+from hybrid.interop.moordyn.tables import _rotated, angles_of, rotation_of
 from hybrid.scene.bodies import turned
 from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.scene.read import read_text

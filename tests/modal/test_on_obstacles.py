@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.designs.network_at_rest import at_rest
-from hybrid.designs.numbers import changed_scene
+from hybrid.designs.numbers_and_results import changed_scene
 from hybrid.scene.sea import Depths
 from tests.modal.test_touching import amplitude
 from tests.scenes import cable_scene, pinned_at

@@ -19,9 +19,9 @@ import hybrid.model.payout
 from hybrid.kernels.state.report import FRICTION, SEABED
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Line
 from hybrid.model.build import Model, build, in_space, planar
-from hybrid.model.failure import without_hold
 from hybrid.model.line import NO_INERTIA, line_on
 from hybrid.model.material import Material, material
+from hybrid.model.nearby import without_hold
 from hybrid.scene.read import one_line
 from tests.inside import OnlyLine
 from tests.scenes import cable_scene, pinned_at

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import root
 
 import hybrid
-from hybrid.outputs.edge_errors import PARTS, LineEnd, Windows, between, curvature, cuts_of, refined
+from hybrid.outputs.probes import PARTS, LineEnd, Windows, between, curvature, cuts_of, refined
 from tests.scenes import cable_scene, pinned_at
 
 T, Q, K = 1.4e4, 180.0, 5e3  # N, N/m, N/m2

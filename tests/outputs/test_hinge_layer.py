@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import solve_banded
 
 import hybrid
-from hybrid.outputs.edge_errors import layer_missed, shown_at_clamp
+from hybrid.outputs.probes import layer_missed, shown_at_clamp
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 LENGTH, JOINT = 100.0, 40.0

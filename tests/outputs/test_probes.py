@@ -11,8 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.state.state import Batch, Floats
-from hybrid.outputs.joined_lines import JoinedObservation
-from hybrid.outputs.observation import Observation
+from hybrid.outputs.observation import JoinedObservation, Observation
 from hybrid.outputs.probes import Observer
 from tests.scenes import cable_scene, pinned_at
 

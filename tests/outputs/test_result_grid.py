@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from hybrid.model.mesh import Zone
 from hybrid.outputs import observed_states
-from hybrid.outputs.joined_lines import JoinedGrid
+from hybrid.outputs.observation import JoinedGrid
 from hybrid.outputs.observed_states import Grid, means_beside
 
 Floats = np.ndarray

@@ -22,7 +22,7 @@ from hybrid.store import checkpoint, hdf5_file
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import pack, unpack
-from hybrid.zones import at_start
+from hybrid.zones import change as zone_changes
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -479,14 +479,14 @@ def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
 
     assert any(e.kind in ("shrink", "merge") for e in hybrid.run(lasting(20.0)).events)
     with monkeypatch.context() as patch:
-        found = at_start.manager_for
+        found = zone_changes.manager_for
 
         def held(*given):
             manager = found(*given)
             manager.held = True
             return manager
 
-        for module in (at_start, zones_at_rest):
+        for module in (zone_changes, zones_at_rest):
             patch.setattr(module, "manager_for", held)
         whole = hybrid.run(lasting(30.0))
         hybrid.run(lasting(15.0), tmp_path / "short.h5").close()

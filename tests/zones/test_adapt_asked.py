@@ -16,8 +16,7 @@ import hybrid
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, advance
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.kernels.state.state import no_sea
-from hybrid.zones.criteria import NodeState, cell_ratios, of_line
-from hybrid.zones.manager import Allowed, DomainManager, Times
+from hybrid.zones.manager import Allowed, DomainManager, NodeState, Times, cell_ratios, of_line
 from tests.scenes import cable_scene
 
 STEP = 0.02

@@ -24,8 +24,7 @@ from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.zones.criteria import shares_asked
-from hybrid.zones.manager import Allowed, Change, DomainManager, Times
+from hybrid.zones.manager import Allowed, Change, DomainManager, Times, shares_asked
 from tests.inside import never_due
 from tests.scenes import cable_scene, pinned_at
 

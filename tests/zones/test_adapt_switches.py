@@ -17,7 +17,7 @@ import hybrid
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.reader import Result
-from hybrid.zones import at_start
+from hybrid.zones import change as zone_changes
 
 BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("end_force_start", "end_force_end")
@@ -170,7 +170,7 @@ def test_compiled_reviews_and_switches_are_those_of_python(
     share: of curvature that is asked, for which results treat pins, and zones must not.
     """
     if share is not None:
-        monkeypatch.setattr(at_start, "shares_asked", lambda *_: {CURVATURE: share})
+        monkeypatch.setattr(zone_changes, "shares_asked", lambda *_: {CURVATURE: share})
     found = []
     for applies in (RunKinds.apply, lambda *_: False):
         monkeypatch.setattr(RunKinds, "apply", applies)

@@ -21,10 +21,8 @@ from hybrid.scene.read import one_line
 from hybrid.scene.schema import LineScene
 from hybrid.simulation import run_zones, zones_at_rest
 from hybrid.solve.stepper import NetworkTaken
-from hybrid.zones.at_start import manager_for, rods_at_winch
-from hybrid.zones.change import ZoneSwitching, on_layout
-from hybrid.zones.criteria import shares_asked
-from hybrid.zones.manager import DomainManager
+from hybrid.zones.change import ZoneSwitching, manager_for, on_layout, rods_at_winch
+from hybrid.zones.manager import DomainManager, shares_asked
 
 
 def line(period: float = 0.0, step: float = 0.001, **model: Any) -> tuple[LineScene, Model]:

@@ -11,9 +11,9 @@ from typing import Any
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.all_lines import ImportedScene, scene_of, scene_of_lines
-from hybrid.interop.moordyn.cables import Cable, cables
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import LEFT_OUT, NOT_NEEDED, TAKEN, Note, Source, in_order, note, read_source
+from hybrid.interop.moordyn.tables import Cable, cables
 from hybrid.interop.moordyn.writer import WRITTEN, WrittenDeck, deck_of
 
 __all__ = ["ImportedDeck", "ImportedScene", "Note", "WrittenDeck", "export_moordyn", "import_moordyn"]

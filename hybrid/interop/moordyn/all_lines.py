@@ -3,7 +3,7 @@
 MoorDyn                              hybrid                because
 Fixed, Coupled points                fixed points          held; a deck does not say how a vessel moves
 Free points; M, V, CdA, Ca rho V     free points           as they are; initial_guess is their place in the deck
-points and rods on bodies            fairleads             bodies as in bodies.py
+points and rods on bodies            fairleads             bodies as in tables.py
 points on a Free body, all at its    one free point        the body's moments of inertia then do nothing
 reference point, its centre there
 free rods without length             sections of one line  the rod hands on the moment of one line to the other
@@ -22,11 +22,21 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.interop.moordyn.bodies import body_table
-from hybrid.interop.moordyn.cables import Cable, End, chain_of, end_of, held_loads, next_line
 from hybrid.interop.moordyn.deck import Body, Deck, Line, LineType, Point
 from hybrid.interop.moordyn.rows import LEFT_OUT, TAKEN, Note, Row, in_order, note, number, show
-from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
+from hybrid.interop.moordyn.tables import (
+    NEAR,
+    Cable,
+    End,
+    Tables,
+    body_table,
+    chain_of,
+    end_of,
+    flow,
+    held_loads,
+    lines_of,
+    next_line,
+)
 from hybrid.scene.ends import Triple
 from hybrid.scene.read import parse_scene, read_text
 

@@ -21,8 +21,7 @@ from textwrap import shorten
 from typing import Any
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.interop.moordyn.bodies import body_row
-from hybrid.interop.moordyn.tables import NEAR
+from hybrid.interop.moordyn.tables import NEAR, body_row
 from hybrid.scene.cable import Section
 from hybrid.scene.read import read_text
 

@@ -4,7 +4,7 @@ The balance across the bed beside edges of contact is solved anew on parts of ce
 
     (T w')' - (EI w'')'' + q + P(-w, -dw/dt) = 0
 
-over some cells about the edge, each cut into parts, by Newton's method (outputs.edge_errors says what for).  Loads q
+over some cells about the edge, each cut into parts, by Newton's method (outputs.probes says what for).  Loads q
 are those that balance the nodes.  Heights of the first and last node stay, with the curvature there; at a clamp the
 first part turns against its direction.  Without the bed and for T > 0 minus the derivative of the balance is
 symmetric and positive definite, and the bed adds to its diagonal: A = L D L^T with two diagonals below the main one,
