@@ -19,7 +19,7 @@ import pytest
 import hybrid
 from hybrid.scene.study import study_from
 from hybrid.studies.cases import cases_of, scene_of
-from hybrid.studies.dispatch import StudyRunning
+from hybrid.studies.study import StudyRunning
 from hybrid.studies.workers import Job, compute_batch, usual
 
 pytestmark = pytest.mark.bench
@@ -116,7 +116,7 @@ def test_memory_of_a_worker_is_flat(folder: Path) -> None:
 def test_empty_tasks() -> None:
     """What the scheduler takes for a task: 10 000 empty ones in one cluster."""
 
-    from hybrid.studies.dispatch import client_of
+    from hybrid.studies.study import client_of
 
     with client_of(2, None) as client:
         begin = clock.perf_counter()

@@ -15,7 +15,7 @@ from peers import adapters, trade
 from peers.adapters.interface import PeerFailed, PeerResult, PeerRun
 
 import hybrid
-from hybrid.store.tradeoff_table import FAILED, Row
+from hybrid.store.tables import FAILED, Row
 from hybrid.studies import runs
 from hybrid.studies.tradeoff import END_FORCES, force_difference, with_errors
 

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import hybrid
-from hybrid.view.animation import animate
+from hybrid.view.matplotlib_backend import animate
 
 ROOT = Path(__file__).parents[1]
 FILMS, PAGE = ROOT / "docs" / "films", ROOT / "docs" / "gallery.md"

@@ -18,7 +18,7 @@ import hybrid
 from hybrid.errors import HybridError
 from hybrid.studies.runs import StudyProgress
 from hybrid.studies.tradeoff import ACCURACIES
-from hybrid.view.study_report import plot_trade
+from hybrid.view.several_runs import plot_trade
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "bench"))

@@ -42,11 +42,11 @@ if TYPE_CHECKING:
     from hybrid.studies.study import case_of as study_case
     from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade, trade_levels
-    from hybrid.view.comparison import write_comparison as compare
     from hybrid.view.notebook import plot_space
     from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map, plot_zones
     from hybrid.view.quantities import plot_summary as plot
     from hybrid.view.report import write_report as report
+    from hybrid.view.several_runs import write_comparison as compare
     from hybrid.zones.manager import NodeState
 
 # Public names by the file that has them, and what those are called there that have another name.
@@ -71,7 +71,7 @@ _FILES = {
     "store.study_file": ("open_study",),
     "studies.study": ("study", "study_case"),
     "studies.tradeoff": ("trade", "trade_levels"),
-    "view.comparison": ("compare",),
+    "view.several_runs": ("compare",),
     "view.notebook": ("plot_space",),
     "view.quantities": ("plot", "plot_energy", "plot_quantity", "plot_shape", "plot_zone_map", "plot_zones"),
     "view.report": ("report",),

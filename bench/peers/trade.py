@@ -23,10 +23,10 @@ from hybrid.model.plan import output_times
 from hybrid.scene.read import SceneLike, as_scene, one_line
 from hybrid.scene.root import Scene
 from hybrid.simulation.progress import interrupts
-from hybrid.store.tradeoff_table import DONE, FAILED, REFERENCE, Row, TradeTable
+from hybrid.store.tables import DONE, FAILED, REFERENCE, Row, TradeTable
 from hybrid.studies.runs import RunStore, key_of
 from hybrid.studies.tradeoff import ACCURACIES, END_FORCES, LevelTable, force_difference, level_row, with_errors
-from hybrid.view.study_report import plot_trade
+from hybrid.view.several_runs import plot_trade
 from peers import adapters
 from peers.adapters.interface import PeerFailed, PeerRun
 

@@ -14,7 +14,7 @@ from make_pictures import EXAMPLES, PICTURES, shrink
 from PIL import Image
 
 import hybrid
-from hybrid.view.animation import animate
+from hybrid.view.matplotlib_backend import animate
 
 # Times, s, of the frames of each example.
 STRIPS = {

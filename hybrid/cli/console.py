@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from hybrid.scene.root import Scene
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
-    from hybrid.studies.dispatch import StudyRunning
     from hybrid.studies.runs import StudyProgress
+    from hybrid.studies.study import StudyRunning
 
 REMEMBERED = (
     50  # reports (about 5 s) that the speed shown is taken from: the compilation of the first step is not in it

@@ -164,11 +164,11 @@ def modes(
         picture = check_target(plot, (*PICTURES, *PAGES)) if plot is not None else None
         found = hybrid.modes(asked, count, near, friction=not smooth)
         if picture is not None and picture.suffix.lower() in PAGES:
-            from hybrid.view.modes_page import write_modes
+            from hybrid.view.report_parts import write_modes
 
             write_modes(found, picture)
         elif picture is not None:
-            from hybrid.view.modes_page import plot_modes
+            from hybrid.view.report_parts import plot_modes
 
             plot_modes(found, picture)
         console.show(lambda: _modes_table(found))
@@ -246,7 +246,7 @@ def stats(
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
     _refuse_alone(curve, strength, section, (mooring, factors, pretension))
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        from hybrid.store.statistics_table import rows_of
+        from hybrid.store.tables import rows_of
 
         opened = _asked_line(opened, result, names)
         if len(opened.times) == 1 and opened.status == "complete" and (above, below, curve, mooring) == (None,) * 4:
@@ -285,7 +285,7 @@ def _asked_line(opened: Result, result: Path, names: Any) -> Result:
 
 def _show_values(console: Console, opened: Result, names: Any, at: Any) -> None:
     """Values of an equilibrium."""
-    from hybrid.store.statistics_table import values_of
+    from hybrid.store.tables import values_of
 
     values = values_of(opened, names, at)
     for row in values:
@@ -340,7 +340,7 @@ def _refuse_alone(curve: str | None, strength: float | None, section: Any, moore
 
 def _fatigue(result: Result, curve: str, strength: float | None, section: Any, times: Any, at: Any) -> dict[str, Any]:
     """Damage and life where the damage is largest, with what errors leave of it, and at the places that are asked."""
-    from hybrid.store.statistics_table import life_within
+    from hybrid.store.tables import life_within
 
     s, damage = result.damage(curve, strength=strength, section=section, times=times, at=at)
     facts = _fatigue_facts(result, s, damage, times, section is not None)

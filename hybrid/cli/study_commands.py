@@ -61,7 +61,7 @@ def design(
         if output is not None:
             output.write_text(found.scene_text(output.parent), encoding="utf-8")
         if picture is not None:
-            from hybrid.view.study_report import plot_design
+            from hybrid.view.several_runs import plot_design
 
             plot_design(found, picture)
         console.show(lambda: _identified(found) if isinstance(found, Identified) else _tables(found))

@@ -22,7 +22,7 @@ from hybrid.interop.moordyn.tables import chain_of, rotation_of
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import frame_of
 from hybrid.scene.analysis import CatenaryModel
-from hybrid.scene.points import Fairlead
+from hybrid.scene.ends import Fairlead
 from hybrid.scene.read import read_text
 from hybrid.simulation.stepped import CableState
 from hybrid.simulation.stepped_points import PointState

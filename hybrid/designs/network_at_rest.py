@@ -65,9 +65,9 @@ from hybrid.model.sections import merged_sections, tension_scale
 from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
+from hybrid.scene.ends import Fairlead
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import contradictions_of
-from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene

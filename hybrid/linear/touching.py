@@ -55,8 +55,8 @@ from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.contents import Touching
 from hybrid.model.network import NetworkModel, NetworkResolution
+from hybrid.scene.ends import FreePoint
 from hybrid.scene.network import Network
-from hybrid.scene.points import FreePoint
 from hybrid.scene.read import scene_text
 from hybrid.simulation.run import static_network
 from hybrid.solve.contact_statics import contact_stiffness

@@ -22,9 +22,8 @@ from hybrid.store.format import MemoryTarget
 from hybrid.store.reader import Result, written_result
 from hybrid.view.curves import along, even
 from hybrid.view.figure import BED, BODY, INK, colour_of
-from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, points_of
+from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, box_and_planes, marked_on, points_of
 from hybrid.view.projections import bed_heights, rings, whole_zones
-from hybrid.view.scenery import box_and_planes, marked_on
 from hybrid.view.summary import facts_of
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.

@@ -312,7 +312,7 @@ class Worker:
         from hybrid.errors import HybridError
         from hybrid.modal.api import modes
         from hybrid.scene.read import read_text
-        from hybrid.view.modes_page import html
+        from hybrid.view.report_parts import html
 
         try:
             return {"html": html(modes(read_text(text, file)[0]))}

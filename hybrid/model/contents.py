@@ -46,9 +46,8 @@ from hybrid.model.resolution import (
 from hybrid.model.sections import swivels
 from hybrid.scene.analysis import USUAL, AdaptiveModel, CatenaryModel
 from hybrid.scene.bodies import Carried, FreeBody
-from hybrid.scene.ends import Clamped, End, Payout, Pinned
+from hybrid.scene.ends import Clamped, End, Fairlead, FreePoint, GuidedPoint, LinesContact, Payout, Pinned
 from hybrid.scene.network import Network, SomeScene
-from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, LinesContact
 from hybrid.scene.schema import LineScene, reachable_obstacles
 from hybrid.scene.waves import RecordedWaves, StreamFunctionWaves
 

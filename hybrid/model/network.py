@@ -50,9 +50,9 @@ from hybrid.model.payout import naming_connection
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody, way_out
+from hybrid.scene.ends import Fairlead
 from hybrid.scene.network import Network
 from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene, reachable_obstacles
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points

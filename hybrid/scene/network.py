@@ -39,23 +39,29 @@ from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, NonNegative, Table, Whole, refuse, turned, value_or_table
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Section
-from hybrid.scene.ends import AtPoint, Clamped, End, Ends, Guided, Pinned, Triple
-from hybrid.scene.motion_checks import Held, lasting_period, moved_in
-from hybrid.scene.motion_tables import GivenLoad, Motion
-from hybrid.scene.obstacles import Obstacles
-from hybrid.scene.points import (
+from hybrid.scene.ends import (
     WINCH,
+    AtPoint,
+    Clamped,
     ClampedConnection,
     Connections,
+    End,
+    Ends,
     Failure,
     Fairlead,
     FixedPoint,
     FreePoint,
+    Guided,
     GuidedPoint,
     LinesContact,
     Name,
+    Pinned,
     Point,
+    Triple,
 )
+from hybrid.scene.motion_checks import Held, lasting_period, moved_in
+from hybrid.scene.motion_tables import GivenLoad, Motion
+from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.schema import Asked, LineScene, SceneTables, pairs_in_reach
 
 # Of the length of a line: how far a free point may be looked for from the other one.

@@ -14,12 +14,11 @@ from hybrid.scene.base import Finding, Place, nearest
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import accuracy_has_errors, contradictions, elevation_has_waves, without_diameter
 from hybrid.scene.combinations import holds_rod, refused, tables_of
-from hybrid.scene.ends import Clamped, Ends, Free
+from hybrid.scene.ends import Clamped, ClampedConnection, Ends, Fairlead, FixedPoint, Free, FreePoint, GuidedPoint
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.motion_tables import TURNS, Motion, farthest, moving_key, shift, smaller
 from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.points import ClampedConnection, Fairlead, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.start_checks import SAME_LENGTH
 

@@ -30,9 +30,9 @@ from hybrid.scene.base import (
     turned,
     unit,
 )
+from hybrid.scene.ends import Name
 from hybrid.scene.motion_file import LARGEST, RecordRefused, read_once, unreadable
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.points import Name
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]

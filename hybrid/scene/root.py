@@ -37,11 +37,22 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted, refuse
 from hybrid.scene.cable import Contact
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
+from hybrid.scene.ends import (
+    Body,
+    Clamped,
+    ClampedConnection,
+    Connection,
+    End,
+    Ends,
+    Free,
+    FreePoint,
+    Guided,
+    Pinned,
+    Point,
+)
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import findings_of
-from hybrid.scene.points import ClampedConnection, Connection, FreePoint, Point
 from hybrid.scene.schema import CableScene, LineScene, standard_schema
 
 LINE = "cable"

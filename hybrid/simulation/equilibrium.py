@@ -29,9 +29,9 @@ from hybrid.model.nearby import MANY, carry_directors, coarser, refined
 from hybrid.model.network import NetworkModel, balanced_places, starts_between
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.base import dotted
+from hybrid.scene.ends import Fairlead
 from hybrid.scene.network import Network
 from hybrid.scene.network_checks import floating_groups
-from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import borne_strain
 from hybrid.simulation.run_start import at_rest_with_contact, letting_touch, named, with_contact

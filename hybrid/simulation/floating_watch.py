@@ -32,9 +32,9 @@ from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.network import NetworkModel, build_network
 from hybrid.outputs.probes import elevation
 from hybrid.scene.attachments import sphere_diameter
+from hybrid.scene.ends import FixedPoint, FreePoint
 from hybrid.scene.network import Network
 from hybrid.scene.plane import OUT
-from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.parts import Part, Sampled, times
 from hybrid.simulation.run_of_lines import RunOfLines

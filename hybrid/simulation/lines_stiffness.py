@@ -22,8 +22,8 @@ from hybrid.model.network import NetworkModel, build_network
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import nearest
 from hybrid.scene.bodies import BodyShape, FixedBody, FreeBody, HeldBody
+from hybrid.scene.ends import Fairlead, FixedPoint
 from hybrid.scene.network import JoinedLine, Network
-from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.result_file import marks_of

@@ -27,8 +27,8 @@ from hybrid.outputs.observation import KEYS, Lines, Probe, pair_fields, pair_for
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.outputs.quantities import Quantities, StepQuantities
 from hybrid.scene.bodies import FreeBody
+from hybrid.scene.ends import Fairlead, FreePoint, GuidedPoint, Point
 from hybrid.scene.network import Network
-from hybrid.scene.points import Fairlead, FreePoint, GuidedPoint, Point
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene

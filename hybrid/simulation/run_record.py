@@ -25,8 +25,8 @@ from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE, Floats
 from hybrid.model.nearby import weaknesses
 from hybrid.model.sections import OutputPoints
+from hybrid.scene.ends import Fairlead
 from hybrid.scene.network import Network
-from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import ShortForm
 from hybrid.scene.schema import LineScene

@@ -25,10 +25,10 @@ from hybrid.model.initial_shape import GIVEN, HUNG, first_state, hung
 from hybrid.model.network import NetworkModel
 from hybrid.scene.analysis import Points
 from hybrid.scene.bodies import FixedBody
+from hybrid.scene.ends import FixedPoint
 from hybrid.scene.motion import motion_record
 from hybrid.scene.motion_tables import Motion, Triple
 from hybrid.scene.network import Network
-from hybrid.scene.points import FixedPoint
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import EventLog, slack_remedy
 from hybrid.simulation.lines_contact import JUMP, crossed, diameters, jumps, least_bending, shared_of, watched_pairs

@@ -25,8 +25,8 @@ from hybrid.model.ends import STILL, DrivenEnd, EndConditions, contradictions, r
 from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkModel
 from hybrid.scene.base import dotted
+from hybrid.scene.ends import Fairlead
 from hybrid.scene.network import Network
-from hybrid.scene.points import Fairlead
 from hybrid.scene.root import ENDS, ShortForm
 from hybrid.simulation.stepped import (
     CableState,

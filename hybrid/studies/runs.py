@@ -28,7 +28,7 @@ from hybrid.scene.read import as_scene, scene_text
 from hybrid.scene.root import Scene
 from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
-from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row
+from hybrid.store.tables import DONE, FAILED, MISSED, OURS, Row
 
 # Accuracy, and part of the duration, of the run that loads the kernels before anything is timed.
 ROUGH = "10%"

@@ -26,7 +26,7 @@ from hybrid.scene.base import dotted
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 from hybrid.simulation.progress import interrupts
-from hybrid.store.tradeoff_table import CHECK, FAILED, REFERENCE, Row, TradeTable, judged
+from hybrid.store.tables import CHECK, FAILED, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import (
     COMPARED,
     FINENESS,
@@ -38,7 +38,7 @@ from hybrid.studies.runs import (
     run_spec,
     scene_data,
 )
-from hybrid.view.study_report import plot_trade
+from hybrid.view.several_runs import plot_trade
 
 ACCURACIES = ("10%", "3%", "1%", "0.3%", "0.1%")
 # The reference: a third of the finest default accuracy.  Finer accuracies need a finer reference: errors below half of

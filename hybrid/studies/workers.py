@@ -23,8 +23,8 @@ from hybrid.store.envelope import farthest
 from hybrid.store.histories import History, extreme_of, history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
-from hybrid.store.statistics_table import too_far_apart
 from hybrid.store.study_file import DONE, FAILED, NOT_WRITTEN, OWN, Column, StudyFile, accuracy_of_case
+from hybrid.store.tables import too_far_apart
 from hybrid.store.verdicts import section_limits
 from hybrid.studies.cases import scene_of
 

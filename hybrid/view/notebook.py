@@ -21,11 +21,10 @@ from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.view.curves import Kept, Store, even, script_json
 from hybrid.view.figure import ALARM, GREY, INK, short
-from hybrid.view.lines import AllLines
+from hybrid.view.lines import AllLines, scenery
 from hybrid.view.panels import shape
 from hybrid.view.plotly_backend import NARROW, draw
 from hybrid.view.report_parts import packed, page_file, plotly_script
-from hybrid.view.scenery import scenery
 from hybrid.view.summary import attention, facts_of, length_of
 from hybrid.view.zones import strip
 

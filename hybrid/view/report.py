@@ -41,11 +41,11 @@ from hybrid.view.lines import (
     motions,
     points_of,
     rotations,
+    scenery,
     shape,
     tension_ranges,
     views_of_lines,
 )
-from hybrid.view.modes_page import section
 from hybrid.view.notebook import picture
 from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges, touchdown
 from hybrid.view.plotly_backend import draw, figure_of
@@ -57,12 +57,12 @@ from hybrid.view.report_parts import (
     filled_page,
     footer,
     plot_html,
+    section,
     settings_html,
     space_html,
     table_html,
     verdict_html,
 )
-from hybrid.view.scenery import scenery
 from hybrid.view.summary import Fact, amount, facts_of, length_of, limits_of_lines
 from hybrid.view.zones import shares, zone_map
 

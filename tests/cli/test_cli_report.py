@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.view import animation as animate
+from hybrid.view import matplotlib_backend
 from tests.called import Call
 
 # A wire of two sections, the second thicker: the larger radius holds at the seam.
@@ -127,11 +127,11 @@ def test_a_picture_that_may_not_be_written_stops_a_run_before_it_begins(call: Ca
 @pytest.mark.long
 def test_a_film_is_an_mp4_where_that_can_be_written_else_a_gif(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as bare:
-        bare.setattr(animate, "ffmpeg", lambda: None)
+        bare.setattr(matplotlib_backend, "ffmpeg", lambda: None)
         code, out, err = call("plot", "run.h5", "--animate")
     assert code == 0 and "it is a gif" in err and out.endswith("-> run.gif\n") and out.startswith("6 frames, ")
     assert Path("run.gif").read_bytes().startswith(b"GIF89a")
-    if animate.ffmpeg() is None:
+    if matplotlib_backend.ffmpeg() is None:
         pytest.skip("no ffmpeg on PATH and no package imageio-ffmpeg: an mp4 cannot be written here")
     code, out, err = call("plot", "run.h5", "--animate")
     assert (code, err) == (0, "") and out.endswith("-> run.mp4\n") and Path("run.mp4").read_bytes()[4:8] == b"ftyp"

@@ -12,7 +12,7 @@ import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError, SceneError
 from hybrid.store.study_file import StudyFile
-from hybrid.view.study_report import html
+from hybrid.view.several_runs import html
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "SALib")
 

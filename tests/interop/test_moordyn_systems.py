@@ -15,7 +15,7 @@ import hybrid
 from hybrid.interop.moordyn import import_moordyn
 from hybrid.interop.moordyn.tables import _rotated, angles_of, rotation_of
 from hybrid.scene.bodies import turned
-from hybrid.scene.points import FixedPoint, FreePoint
+from hybrid.scene.ends import FixedPoint, FreePoint
 from hybrid.scene.read import read_text
 
 # A riser over a buoyant section, held by a tether: rods without length join its sections, a body the tether.

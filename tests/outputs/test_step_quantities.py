@@ -13,7 +13,7 @@ from hybrid.scene.quantities import KINDS
 from hybrid.scene.read import read_text
 from hybrid.scene.study import Kept
 from hybrid.store.limits import held_of
-from hybrid.store.statistics_table import rows_of
+from hybrid.store.tables import rows_of
 from hybrid.studies.workers import collected
 
 SCENE = """

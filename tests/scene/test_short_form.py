@@ -12,8 +12,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.base import Finding
-from hybrid.scene.ends import Ends
-from hybrid.scene.points import FixedPoint, FreePoint, GuidedPoint
+from hybrid.scene.ends import Ends, FixedPoint, FreePoint, GuidedPoint
 from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.root import LINE, POINTS, Scene, in_full, line_of
 from hybrid.scene.schema import CableScene

@@ -12,8 +12,8 @@ from hybrid.errors import SceneError
 from hybrid.kernels.junctions.bodies import FORCE, MOMENT, NUMBERS
 from hybrid.model.bodies import body_model
 from hybrid.scene.bodies import FixedBody, FreeBody, Hydrostatics
+from hybrid.scene.ends import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.network import JoinedLine, Network, NetworkOutput
-from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.read import load_scene, read_text, scene_text
 
 PAGE = Path(__file__).parents[2] / "docs" / "scene.md"

@@ -15,7 +15,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.errors import SceneError
 from hybrid.store.capacity import E301, F201, Row, code_of_steps, collapse, most_used, of_riser, use, used
-from hybrid.store.statistics_table import rows_of
+from hybrid.store.tables import rows_of
 from tests.combinations.pairs import as_network
 from tests.said import line_of
 from tests.scenes import cable_scene, clamped_at, pinned_at

@@ -15,9 +15,9 @@ from hybrid.cli.statistics_commands import _fatigue_at, _fatigue_lines
 from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
 from hybrid.statistics.fatigue import damage
-from hybrid.store import statistics_table
+from hybrid.store import tables
 from hybrid.store.histories import bends_of, extreme_of, history_of
-from hybrid.store.statistics_table import rows_of, values_of
+from hybrid.store.tables import rows_of, values_of
 from tests.called import Call
 from tests.scenes import cable_scene, pinned_at
 
@@ -379,11 +379,11 @@ class Seen:
 
 
 def within(error: float, monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any], float]:
-    monkeypatch.setattr(statistics_table, "history_of", lambda *_: HISTORY)
+    monkeypatch.setattr(tables, "history_of", lambda *_: HISTORY)
     seen: Any = Seen(error)
     done = float(seen.damage(CURVE, strength=None, section=SECTION, times=None, at=[5.0])[1][0])
     facts = {"s": 5.0, "damage": done, "life": 2.0}
-    return statistics_table.life_within(seen, facts, CURVE, None, SECTION, None), done
+    return tables.life_within(seen, facts, CURVE, None, SECTION, None), done
 
 
 @pytest.mark.needs("rainflow")
@@ -403,13 +403,13 @@ def test_an_error_as_large_as_what_varies_leaves_no_life(monkeypatch: pytest.Mon
 
 def test_an_error_of_a_tension_that_hardly_varies_counts_by_its_stress(monkeypatch: pytest.MonkeyPatch) -> None:
     """10 N on 1e-3 m^2 are 0.01 MPa, where bending swings by 7 MPa in the root mean square."""
-    monkeypatch.setattr(statistics_table, "history_of", lambda *_: HISTORY)
+    monkeypatch.setattr(tables, "history_of", lambda *_: HISTORY)
     seen: Any = Seen(0.0)
     seen._values["errors/total/tension"] = np.full((T.size, S.size), 10.0)
     swing = 0.5 * SECTION[2] * SECTION[1] * 1e-3 / np.sqrt(2.0)
-    part = statistics_table.part_off(seen, 5.0, None, SECTION)
+    part = tables.part_off(seen, 5.0, None, SECTION)
     assert part == pytest.approx(10.0 / SECTION[0] / swing, rel=1e-3) and part < 0.01
-    assert statistics_table.part_off(seen, 5.0, None, None) > 1.0  # of tension alone nothing is known
+    assert tables.part_off(seen, 5.0, None, None) > 1.0  # of tension alone nothing is known
 
 
 def test_outputs_that_miss_crests_leave_no_life(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -417,12 +417,12 @@ def test_outputs_that_miss_crests_leave_no_life(monkeypatch: pytest.MonkeyPatch)
     for n, doubted in ((2.7, True), (5.3, True), (6.7, False), (20.0, False)):
         t = np.arange(0.0, 1000.0, 10.0 / n)
         history = SimpleNamespace(t=t, values=1e4 + np.sin(2 * np.pi * t / 10.0)[:, None])
-        monkeypatch.setattr(statistics_table, "history_of", lambda *_, history=history: history)
+        monkeypatch.setattr(tables, "history_of", lambda *_, history=history: history)
         seen: Any = Seen(0.0)
-        why = statistics_table.too_far_apart(seen, 5.0, None)
+        why = tables.too_far_apart(seen, 5.0, None)
         assert bool(why) is doubted
         if doubted:
             facts = {"s": 5.0, "damage": 1e-6, "life": 2.0}
-            found = statistics_table.life_within(seen, facts, CURVE, None, SECTION, None)
+            found = tables.life_within(seen, facts, CURVE, None, SECTION, None)
             assert found == {"life": None, "life_not_verified": why}
             assert f"{n:.2g} outputs to a cycle" in why and why.endswith("output.every: 1")

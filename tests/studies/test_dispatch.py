@@ -19,7 +19,7 @@ import distributed
 
 from hybrid.errors import ResultError
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile, open_study
-from hybrid.studies import dispatch
+from hybrid.studies import study as study_module
 from hybrid.studies.workers import Job, Outcome, Variable
 
 CASES, BATCH = 8, 2
@@ -88,7 +88,7 @@ def computed(path: Path, pool: Pool, monkeypatch: pytest.MonkeyPatch) -> StudyFi
     def job_of(k: int) -> Job:
         return Job({}, {}, rows[file.slice_of(k)], {}, False)
 
-    dispatch._Batches(pool, file, job_of, lambda: None).compute(file.open_batches())
+    study_module._Batches(pool, file, job_of, lambda: None).compute(file.open_batches())
     return file
 
 
@@ -125,7 +125,7 @@ def test_a_disk_that_is_full_is_no_scheduler_that_is_gone(tmp_path: Path, monkey
     file = StudyFile.create(tmp_path / "x.zarr", {"x": Column("", "x", (), np.arange(CASES))}, CASES, BATCH, {})
     pool = Pool(lambda job: [outcome(row["x"]) for row in job.rows], [0, 1, 2, 3])
     monkeypatch.setattr(distributed, "as_completed", lambda loop: pool)
-    monkeypatch.setattr(dispatch, "client_of", lambda *_: nullcontext(pool))
+    monkeypatch.setattr(study_module, "client_of", lambda *_: nullcontext(pool))
 
     class Full:
         def __setitem__(self, where: object, values: object) -> None:
@@ -134,7 +134,7 @@ def test_a_disk_that_is_full_is_no_scheduler_that_is_gone(tmp_path: Path, monkey
     file._arrays["status"] = Full()
     cases: Any = SimpleNamespace(base={}, keys={}, rows=[{"x": x} for x in range(CASES)], static=False)
     with pytest.raises(ResultError, match=r"cannot be written\n.*No space"):
-        dispatch.compute_open_batches(file, cases, {}, None, None, None)
+        study_module.compute_open_batches(file, cases, {}, None, None, None)
 
 
 @pytest.mark.parametrize("deadly", [0, 5])

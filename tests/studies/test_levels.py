@@ -15,7 +15,7 @@ import yaml
 import hybrid
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import in_full
-from hybrid.store.tradeoff_table import FAILED, Row
+from hybrid.store.tables import FAILED, Row
 from hybrid.studies import runs
 from hybrid.studies.tradeoff import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
 from tests.studies.test_trade import SAG as SAGS

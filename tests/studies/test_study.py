@@ -19,7 +19,7 @@ from hybrid.errors import ResultError, SceneError
 from hybrid.scene.study import Kept, read_study, study_from
 from hybrid.store.study_file import DONE, FAILED, KILLED, NOT_WRITTEN, OPEN, StudyFile
 from hybrid.studies.cases import cases_of, short_names
-from hybrid.studies.dispatch import client_of
+from hybrid.studies.study import client_of
 from hybrid.studies.workers import collected
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
@@ -218,9 +218,9 @@ def test_other_workers_and_batches_give_the_same(folder: Path, found: object, tm
 
 def test_a_second_call_does_what_is_missing(folder: Path, found: object, monkeypatch: pytest.MonkeyPatch) -> None:
     """A complete study starts no worker; of an incomplete one only the open batches are computed."""
-    from hybrid.studies import dispatch
+    from hybrid.studies import study as study_module
 
-    monkeypatch.setattr(dispatch, "client_of", None)
+    monkeypatch.setattr(study_module, "client_of", None)
     again = hybrid.study(folder / "heave.yaml")
     assert again.equals(found)
 
@@ -524,7 +524,7 @@ def test_a_case_that_kills_its_worker_is_data(
             network.kill(network.getpid(), 9)
         return compute_batch(job)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("hybrid.studies.dispatch.compute_batch", deadly)
+    monkeypatch.setattr("hybrid.studies.study.compute_batch", deadly)
     after = hybrid.study(folder / "heave.yaml", tmp_path / "deadly.zarr", workers=2, batch=3)
     dead = (after.A.values == 0.5) & (after["T"].values == 6)
     assert dead.sum() == 1 and "worker died" in str(after.reason.values[dead][0])

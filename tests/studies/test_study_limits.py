@@ -23,7 +23,7 @@ from hybrid.store.study_file import open_study, unmet_accuracy
 from hybrid.studies.cases import Cases, cases_of
 from hybrid.studies.study import _created, _refuse_limits_not_there, _remove_cases
 from hybrid.studies.workers import Job, compute_batch, write_outcomes
-from hybrid.view.study_report import html
+from hybrid.view.several_runs import html
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 

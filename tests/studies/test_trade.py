@@ -19,9 +19,9 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.scene.root import in_full
-from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
+from hybrid.store.tables import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
 from hybrid.studies import runs, tradeoff
-from hybrid.view.study_report import plot_trade
+from hybrid.view.several_runs import plot_trade
 from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 # A second of a line that hangs in water: every model can do it, and a run is some 0.1 s.

@@ -17,15 +17,15 @@ from reported import reported
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.store.tradeoff_table import TradeTable
-from hybrid.view import animation as film
-from hybrid.view.animation import animate
+from hybrid.store.tables import TradeTable
+from hybrid.view import matplotlib_backend as backend
 from hybrid.view.figure import KIND_COLOURS, is_ours
-from hybrid.view.study_report import plot_trade
+from hybrid.view.matplotlib_backend import animate
+from hybrid.view.several_runs import plot_trade
 
 
 def test_a_gif_moves_at_the_pace_that_is_said(tmp_path: Path) -> None:
-    made = film.animate(reported(), tmp_path / "run.gif")
+    made = backend.animate(reported(), tmp_path / "run.gif")
     with Image.open(made.path) as image:
         assert image.n_frames == made.frames == 21 and image.info["loop"] == 0
         seconds = made.frames * image.info["duration"] / 1000
@@ -43,7 +43,7 @@ def test_a_gif_moves_at_the_pace_that_is_said(tmp_path: Path) -> None:
 
 def test_a_narrow_page_for_telephones(tmp_path: Path) -> None:
     """The clock, which has the same size in inches, is wider beside the page; the cable moves there as well."""
-    with Image.open(film.animate(reported(outputs=3), tmp_path / "run.gif", width=4.4).path) as image:
+    with Image.open(backend.animate(reported(outputs=3), tmp_path / "run.gif", width=4.4).path) as image:
         size, first = image.size, np.asarray(image.convert("RGB"), float)
         image.seek(1)
         second = np.asarray(image.convert("RGB"), float)
@@ -52,10 +52,10 @@ def test_a_narrow_page_for_telephones(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_an_mp4_plays_everywhere(tmp_path: Path) -> None:
-    program = film.ffmpeg()
+    program = backend.ffmpeg()
     if program is None:
         pytest.skip("no ffmpeg on PATH and no package imageio-ffmpeg: an mp4 cannot be written here")
-    made = film.animate(reported(), tmp_path / "run.mp4")
+    made = backend.animate(reported(), tmp_path / "run.mp4")
     said = subprocess.run([program, "-i", str(made.path), "-f", "null", "-"], capture_output=True, text=True).stderr
     assert "h264" in said and "yuv420p" in said and "1200x768" in said
     counted = [int(x) for x in re.findall(r"frame=\s*(\d+)", said)]
@@ -64,16 +64,16 @@ def test_an_mp4_plays_everywhere(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_the_number_of_frames_is_bounded_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(film._FRAMES, ".gif", 24)
-    made = film.animate(reported(outputs=151, points=21), tmp_path / "run.gif")
+    monkeypatch.setitem(backend._FRAMES, ".gif", 24)
+    made = backend.animate(reported(outputs=151, points=21), tmp_path / "run.gif")
     assert made.frames <= 24 and f"{made.frames} frames of 151 outputs" in made.text
-    assert "of" not in film.animate(reported(outputs=5), tmp_path / "few.gif").text.split(",")[0]
+    assert "of" not in backend.animate(reported(outputs=5), tmp_path / "few.gif").text.split(",")[0]
 
 
 def test_frames_are_the_outputs_nearest_to_even_times() -> None:
     result = reported(outputs=101)
-    assert film._frames(result, 11).tolist() == list(range(0, 101, 10))
-    assert film._frames(result, 1000).tolist() == list(range(101))
+    assert backend._frames(result, 11).tolist() == list(range(0, 101, 10))
+    assert backend._frames(result, 1000).tolist() == list(range(101))
 
 
 @pytest.mark.parametrize(
@@ -82,29 +82,29 @@ def test_frames_are_the_outputs_nearest_to_even_times() -> None:
 )
 def test_what_cannot_be_written_is_refused(tmp_path: Path, name: str, words: str) -> None:
     with pytest.raises(ResultError, match=words):
-        film.animate(reported(), tmp_path / name)
+        backend.animate(reported(), tmp_path / name)
 
 
 @pytest.mark.parametrize("outputs", [0, 1])
 def test_what_does_not_move_is_refused(tmp_path: Path, outputs: int) -> None:
     with pytest.raises(ResultError, match="nothing moves"):
-        film.animate(reported(outputs=outputs), tmp_path / "run.gif")
+        backend.animate(reported(outputs=outputs), tmp_path / "run.gif")
     assert not list(tmp_path.iterdir())
 
 
 def test_without_ffmpeg_an_mp4_is_refused_with_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(film, "ffmpeg", lambda: None)
+    monkeypatch.setattr(backend, "ffmpeg", lambda: None)
     with pytest.raises(ResultError, match=r"needs the program ffmpeg(.|\n)*\[video\]"):
-        film.animate(reported(), tmp_path / "run.mp4")
+        backend.animate(reported(), tmp_path / "run.mp4")
 
 
 def test_a_failing_ffmpeg_is_quoted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = tmp_path / "ffmpeg"
     broken.write_text("#!/bin/sh\necho 'no such codec' >&2\nexit 1\n")
     broken.chmod(0o755)
-    monkeypatch.setattr(film, "ffmpeg", lambda: str(broken))
+    monkeypatch.setattr(backend, "ffmpeg", lambda: str(broken))
     with pytest.raises(ResultError, match="no such codec"):
-        film.animate(reported(), tmp_path / "run.mp4")
+        backend.animate(reported(), tmp_path / "run.mp4")
     assert [x.name for x in tmp_path.iterdir()] == ["ffmpeg"]
 
 

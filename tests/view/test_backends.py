@@ -158,7 +158,7 @@ def test_libraries_that_draw_are_known_to_their_back_end_only() -> None:
             "matplotlib_backend.py",
             "quantities.py",
             "figure.py",
-            "study_report.py",
+            "several_runs.py",
         ):  # types of results there
             assert not any(name.startswith("matplotlib") for name in names), file
 

@@ -13,8 +13,8 @@ from reported import reported
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.view.comparison import COLOURS, _differences, _ranges, _table
 from hybrid.view.figure import short
+from hybrid.view.several_runs import OF_RUNS, _differences, _ranges_along, _table
 
 SCENE = """
 title: {title}
@@ -40,7 +40,7 @@ def test_differences_are_those_at_the_same_instant_and_place() -> None:
     assert factor in (pytest.approx(1.0), pytest.approx(1000.0)) and over["b"].x[over["b"].y.argmax()] == 5.0
     assert along["b"].x[along["b"].y.argmax()] == 50.0 and np.count_nonzero(over["b"].y) == 1
     assert over["c"].x.size == 21 and over["c"].y.max() < 1e-9  # twice as many outputs: those in common are the same
-    ranges = {panel.key: panel for panel in _ranges(runs)}["range-tension"]
+    ranges = {panel.key: panel for panel in _ranges_along(runs)}["range-tension"]
     assert [line.label for line in ranges.items if line.label] == ["a", "b", "c"]
 
 
@@ -66,8 +66,8 @@ def test_every_graph_stands_under_its_own_title(tmp_path: Path) -> None:
 def test_a_result_without_bending_moments_before_one_that_has_them() -> None:
     """A cable without bending stiffness has none: it ended with a traceback, and curves had each other's colours."""
     runs = {"a": reported(rod=False), "b": reported(dip=12000.0)}
-    (line,) = [x for x in {p.key: p for p in _ranges(runs)}["range-bending_moment"].items if x.label]
-    assert (line.label, line.colour) == ("b", COLOURS[1])
+    (line,) = [x for x in {p.key: p for p in _ranges_along(runs)}["range-bending_moment"].items if x.label]
+    assert (line.label, line.colour) == ("b", OF_RUNS[1])
     rows = dict(re.findall(r"<tr><td>([^<]*)</td>(.*?)</tr>", _table(runs)))
     cells = re.findall(r"<td[^>]*>(.*?)</td>", rows["largest bending moment"])
     assert cells[0] == "–" and cells[1].endswith(" N m")

@@ -14,7 +14,7 @@ import hybrid
 from hybrid.cli.tables import extremes_facts, extremes_rows
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.store.reader import Result
-from hybrid.view import animation, panels
+from hybrid.view import matplotlib_backend, panels
 from hybrid.view.curves import along, kept
 from hybrid.view.figure import NEWS, Band, Line, Panel, prefix
 from hybrid.view.panels import error_of, profiles
@@ -299,7 +299,7 @@ def test_histories_at_a_jump_are_two(swing: hybrid.Result) -> None:
 def test_pages_and_films_of_jumps_are_made(swing: hybrid.Result, tmp_path: Path) -> None:
     assert hybrid.report(swing, tmp_path / "swing.html").stat().st_size > 1e5
     hybrid.plot(swing, path=tmp_path / "swing.png")
-    assert animation.animate(swing, tmp_path / "swing.gif").frames == 11
+    assert matplotlib_backend.animate(swing, tmp_path / "swing.gif").frames == 11
 
 
 def test_the_largest_value_may_be_the_one_on_the_right() -> None:

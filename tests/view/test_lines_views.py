@@ -19,14 +19,14 @@ import hybrid.cli.commands  # registers them
 from hybrid.cli.app import app
 from hybrid.cli.console import Console
 from hybrid.cli.plan_tables import plan_rows
-from hybrid.cli.result_tables import show_equilibrium, show_motion
+from hybrid.cli.tables import show_equilibrium, show_motion
 from hybrid.errors import ResultError
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import in_full
 from hybrid.store.records import Zone
-from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks, Text
 from hybrid.view.lines import AllLines, arms_of, clearest_view, motions, page, points_of, rotations, views_of_lines
+from hybrid.view.matplotlib_backend import animate
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import _extreme_text, html
 from tests.scenes import network_scene

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.live.workers import Worker
-from hybrid.view.modes_page import section
+from hybrid.view.report_parts import section
 
 # Of two bending stiffnesses, or modes of one period could swing in any direction, along the line of sight as well.
 SCENE = """

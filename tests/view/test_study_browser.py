@@ -15,7 +15,7 @@ pytestmark = extras.of_file("playwright", "dask", "zarr", "xarray")
 from test_report_browser import Visit, browser  # noqa: F401
 
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
-from hybrid.view.study_report import write_study_report
+from hybrid.view.several_runs import write_study_report
 
 CASES = 2000
 
