@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from hybrid.studies.study import case_of as study_case
     from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade, trade_levels
-    from hybrid.view.notebook import plot_space
     from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map, plot_zones
     from hybrid.view.quantities import plot_summary as plot
+    from hybrid.view.report import plot_space
     from hybrid.view.report import write_report as report
     from hybrid.view.several_runs import write_comparison as compare
     from hybrid.zones.manager import NodeState
@@ -72,9 +72,8 @@ _FILES = {
     "studies.study": ("study", "study_case"),
     "studies.tradeoff": ("trade", "trade_levels"),
     "view.several_runs": ("compare",),
-    "view.notebook": ("plot_space",),
     "view.quantities": ("plot", "plot_energy", "plot_quantity", "plot_shape", "plot_zone_map", "plot_zones"),
-    "view.report": ("report",),
+    "view.report": ("plot_space", "report"),
     "zones.manager": ("NodeState",),
 }
 _THERE = {

@@ -201,12 +201,12 @@ class Result(StoredResult):
 
     def _ipython_display_(self) -> None:
         """Show the card and the cable in space in a notebook; elsewhere IPython takes one of the other ways."""
-        import_module("hybrid.view.notebook").show(self)  # by name: the store imports no view
+        import_module("hybrid.view.report").show(self)  # by name: the store imports no view
 
     def _repr_html_(self) -> str:
         """What a notebook shows; of a result that cannot be drawn, what a terminal shows."""
         try:
-            return str(import_module("hybrid.view.notebook").card(self))  # by name: the store imports no view
+            return str(import_module("hybrid.view.report").card(self))  # by name: the store imports no view
         except Exception:  # a cell must never fail because its result is closed, empty or odd
             try:
                 return f"<pre>{html.escape(repr(self))}</pre>"

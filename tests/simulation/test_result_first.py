@@ -34,8 +34,8 @@ from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, 
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store import whole_file, writer
 from hybrid.store.whole_file import LateFile
-from hybrid.view.notebook import card
 from hybrid.view.panels import page_of
+from hybrid.view.report import card
 from hybrid.view.summary import facts_of
 from tests.scenes import line_between, network_scene
 

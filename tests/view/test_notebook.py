@@ -16,7 +16,7 @@ import hybrid
 from hybrid.simulation import progress
 from hybrid.simulation.progress import Progress, StatusLine, listener_of
 from hybrid.view.figure import KIND_COLOURS
-from hybrid.view.notebook import MIME, MOST_FRAMES, MOST_POINTS, bundle, picture
+from hybrid.view.report import MIME, MOST_FRAMES, MOST_POINTS, bundle, picture
 
 CELL = f"""
 import sys
@@ -206,7 +206,7 @@ def test_it_never_raises(asked: dict) -> None:
 def test_a_closed_result_shows_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
     result = reported(title="<b>odd</b>")
     result.close()
-    monkeypatch.setattr("hybrid.view.notebook.card", lambda result: 1 / 0)
+    monkeypatch.setattr("hybrid.view.report.card", lambda result: 1 / 0)
     assert result._repr_html_().startswith("<pre>") and "<b>" not in result._repr_html_()
     monkeypatch.setattr(type(result), "__repr__", lambda self: str(1 / 0))
     assert "can no longer be read" in result._repr_html_()
