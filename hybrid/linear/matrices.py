@@ -51,8 +51,8 @@ from hybrid.kernels.laws.soil import TURN as TURN_DEPTH
 from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.run import entry
-from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, MOMENT_A, PLANAR, ROTARY, SOIL, WAVES
-from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, Work, no_torsion
+from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, HELD_SLIP, MOMENT_A, PLANAR, ROTARY, SOIL, WAVES
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, no_torsion
 from hybrid.kernels.step.step import friction_axes
 from hybrid.linear.touching import Blocks, TouchingLines, TouchingParts, hats, touching_parts
 from hybrid.model.bodies import Members
@@ -83,7 +83,7 @@ def with_layers(line: Line, state: State, sticks: bool) -> Line:
     now[:, MOST::EACH] = np.where(elastic, most, np.inf) if sticks else most
     for k in range(KEPT if sticks else 0):
         now[:, FROM + k :: EACH] = state.layers[:, k::KEPT]
-    return line._replace(slip_now=now, slip_at=NO_ADDRESS)
+    return line._replace(slip_now=now, bits=line.bits | HELD_SLIP)
 
 
 def load_layers(line: Line, ends: Ends, state: State, work: Work) -> None:
@@ -301,7 +301,7 @@ def in_space(line: Line, state: State, sticks: bool, quick: bool = True) -> Line
     off = PLANAR | WAVES | (0 if sticks else FRICTION)
     line = with_layers(line, state, sticks=quick)
     if quick:
-        return line._replace(bits=line.bits & ~(off | AXIAL_LAW), law_at=NO_ADDRESS, ck=ck)
+        return line._replace(bits=line.bits & ~(off | AXIAL_LAW), ck=ck)
     return line._replace(bits=line.bits & ~off, ck=ck.copy(), law=line.law.copy())  # the law writes both
 
 

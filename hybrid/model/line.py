@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.laws.axial_law import SHIFT, linearise_law
+from hybrid.kernels.laws.axial_law import SHIFT
 from hybrid.kernels.laws.bending_law import (
     EACH,
     ENERGY,
@@ -18,10 +18,8 @@ from hybrid.kernels.laws.bending_law import (
     HALF_B,
     LAST_A,
     LAST_B,
-    update_slip,
 )
 from hybrid.kernels.laws.element import NO_SPRING
-from hybrid.kernels.laws.tension_torque import linearise_law_with_torque
 from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.remesh import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
@@ -37,7 +35,6 @@ from hybrid.kernels.state.report import (
     STIFFNESS_DAMPING,
 )
 from hybrid.kernels.state.state import (
-    NO_ADDRESS,
     NO_BEND_LAW,
     NO_LAW,
     NO_PLANE,
@@ -48,9 +45,6 @@ from hybrid.kernels.state.state import (
     Floats,
     Line,
     blank_line,
-    no_ends,
-    no_work,
-    state_for,
 )
 from hybrid.model.material import Material, elastic_layer, nodes_at
 from hybrid.scene.section_laws import Curve, Layer, slopes
@@ -99,8 +93,8 @@ def on_base(
     job.bind(cable=cable, nodes=s, base_of_cell=of_cell, rod=rod, line=line)
     fill_line(job.numbers)
     if material.curves is not None:
-        law, law_table, law_at = axial_law(material, h, of)
-        line = line._replace(law=law, law_table=law_table, law_at=law_at)
+        law, law_table = axial_law(material, h, of)
+        line = line._replace(law=law, law_table=law_table)
     if material.bends is not None:
         bent, table = bend_law(material, line, of)
         line = line._replace(bend_law=bent, bend_table=table)
@@ -222,10 +216,10 @@ def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:
     return out
 
 
-def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """`law`, `law_table` and `law_at` of a line with cells of lengths h (N,) m on pieces `of` (N,)."""
+def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Floats]:
+    """`law` and `law_table` of a line with cells of lengths h (N,) m on pieces `of` (N,)."""
     if material.curves is None:
-        return NO_LAW, NO_TABLE, NO_ADDRESS
+        return NO_LAW, NO_TABLE
     law, rows, begin = np.zeros((h.size, NO_LAW.shape[1])), [], 0
     for k, piece in enumerate(material.curves):
         cells = of == k
@@ -236,12 +230,7 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
         rows.append(np.column_stack([strain, tension, energy]))
         law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic, *piece.working, *piece.creep)
         begin += strain.size
-    table = np.concatenate(rows)
-    blank = blank_line(1)._replace(law=law, law_table=table)
-    state = state_for(blank)
-    follow = linearise_law_with_torque if material.tension_torque.size else linearise_law
-    address = follow.address(blank, state, state, no_work(), 0.0, 0.0)
-    return law, table, np.array([address], np.int64)
+    return law, np.concatenate(rows)
 
 
 # Layers that slip on each other as a line bends: of the elements of a line on its cells.
@@ -276,11 +265,7 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
     law = np.zeros((line.s.size, max(widths)))
     for i, row in enumerate(rows):
         law[i, : len(row)] = row
-    found = line._replace(slip_law=law, slip_now=np.zeros_like(law))
-    blank = blank_line(1)._replace(slip_law=law[:2].copy(), slip_now=law[:2].copy())
-    state = state_for(blank)
-    address = update_slip.address(blank, no_ends(), state, state, no_work(), 0)
-    return found._replace(slip_at=np.array([address], np.int64))
+    return line._replace(slip_law=law, slip_now=np.zeros_like(law))
 
 
 def give_of(spring: float, half: float) -> float:

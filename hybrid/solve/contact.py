@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.contact.self_contact import blank_contact_job, contact_task, observe_coupled
+from hybrid.kernels.contact.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.contact.self_contact_law import (
     AT,
     DISTANCE,
@@ -78,7 +78,6 @@ class Strand(NamedTuple):
     stiff: Floats  # N, least size of the law
     mass: Floats  # kg/m
     rolls: float  # 1 where friction turns it about itself; 0: nothing holds its spin
-    couples: bool  # whether tension makes a torque in it
 
 
 def strand_of(line: Line, width: Floats, bending: Floats, tension_scale: float) -> Strand:
@@ -94,7 +93,7 @@ def strand_of(line: Line, width: Floats, bending: Floats, tension_scale: float) 
     return Strand(
         widths, np.maximum(np.ceil(lengths / (SPACING * widths)), 1),
         np.maximum(STIFFNESS * bends / widths**2, TENSION * tension_scale * (bends == 0.0)),
-        line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist), line.tension_twist.size > 0,
+        line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist),
     )  # fmt: skip
 
 
@@ -114,9 +113,6 @@ def contact_of_strands(strands: Sequence[Strand], friction: float) -> Contact:
     numbers = contact.numbers
     numbers.widest, numbers.narrowest, numbers.friction = contact.width.max(), contact.width.min(), friction
     numbers.rolls = contact.rolls.max()
-    if any(x.couples for x in strands):
-        one = blank_line(1), no_ends(), blank_state(1), blank_contact(1)
-        contact.observer[0] = observe_coupled.address(*one, 0, 0)
     numbers.since = numbers.faded = numbers.begun = numbers.led = np.nan
     numbers.quiet = np.inf
     return contact

@@ -29,7 +29,7 @@ from hybrid.kernels.state.report import (
     STIFFNESS,
     TOUCHES,
 )
-from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
 from hybrid.solve.flaws import at_rest, fold_text, lowest_tension, on_obstacles, slack_text
 from hybrid.solve.network_solver import NetworkSolver
@@ -430,7 +430,7 @@ def _harder(x: JoinedLine, goal: float, short: Floats) -> JoinedLine:
     line, longer, harder = x.line, min(1.0, 2.0 * goal), max(0.0, 2.0 * goal - 1.0)
     soft, hard = np.maximum(line.ck, 1.0 / x.scale), np.maximum(line.ck, NEARLY_STIFF / x.scale)
     h, ck = short ** (1 - longer) * line.h**longer, soft ** (1 - harder) * hard**harder
-    return x._replace(line=line._replace(h=h, ck=ck, bits=line.bits & ~AXIAL_LAW, law_at=NO_ADDRESS))
+    return x._replace(line=line._replace(h=h, ck=ck, bits=line.bits & ~AXIAL_LAW))
 
 
 def _taut(solver: NetworkSolver, taken: NetworkTaken, states: NetworkState) -> Solution:

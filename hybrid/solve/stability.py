@@ -15,7 +15,7 @@ from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import block_rows, workspace
 from hybrid.kernels.state.report import AXIAL_LAW, DRAG, MASS_DAMPING, PLANAR, ROTARY
-from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 
 # What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
 # length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.
@@ -137,7 +137,7 @@ class Stability:
         """length: m; scale: the tension scale, N."""
         # drag counts as a load that keeps its direction: how it turns with the cable is not conservative; a law of
         # stretch is not followed, which would write into the line, and `ck` is what it made of it last
-        self.line, self.sea = line._replace(bits=line.bits & ~(DRAG | AXIAL_LAW), law_at=NO_ADDRESS), sea
+        self.line, self.sea = line._replace(bits=line.bits & ~(DRAG | AXIAL_LAW)), sea
         self.length, self.scale = length, scale
         self.anchor = ANCHOR * scale / (float(line.mass.sum()) * length)  # 1/s2
         self.blurred = False  # whether round-off had the last word on stability

@@ -8,7 +8,6 @@ from kernels.test_zone_torque import residual as zone_residual
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
-from hybrid.kernels.laws.tension_torque import linearise_law_with_torque
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.march import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
@@ -34,9 +33,7 @@ def with_law(line, st):
     law[:, 1] = 4.0
     law[1] = 0.0
     line = line._replace(bits=line.bits | AXIAL_LAW, law=law, law_table=np.column_stack([strain, tension, energy]))
-    st = st._replace(slow=np.zeros(N))
-    address = linearise_law_with_torque.address(line, st, st, workspace_of(line), 0.0, 0.0)
-    return line._replace(law_at=np.array([address], np.int64)), st
+    return line, st._replace(slow=np.zeros(N))
 
 
 def residual(line, sea, ends, st, x):

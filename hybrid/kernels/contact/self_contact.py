@@ -49,7 +49,7 @@ from hybrid.kernels.laws.bending_law import energy_share, stored_by_slip
 from hybrid.kernels.laws.element import chord, strain_of_element, turning
 from hybrid.kernels.laws.tension_torque import couples
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.machine.references import caller_of_six, reader
+from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import Observed, find_powers, loses, observe
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.state.books import RATES, Clock, Counts
@@ -76,7 +76,6 @@ from hybrid.kernels.step.step_control import before_fixed, radius_of_step, schem
 MOST_GAIN = 5e-4
 # Diameters that the fastest part moves, beside the mean, in the shortest step that is halved.
 LEAST_TRAVEL = 0.05
-call_observer = caller_of_six(0)
 
 
 @inner
@@ -113,24 +112,14 @@ def energy_of_line(line, ends, state):
     return moving + bent + twisted, longer
 
 
-@kernel
-def observe_coupled(line, ends, state, contact, _1, _2):
-    """Energies, J, of a line in which tension makes a torque, into contact.energy; contact.at and .move are used as room.
-
-    Called by its address (Contact.observer), so that contact of other lines compiles none of it.
-    """
-    observed = Observed(contact.at, contact.move, contact.energy)
-    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
-    contact.counts.stale = 1
-    return 0
-
-
 @called
 def energy_without_weight(line, ends, contact, state, report):
     """Energy, J, of motion, strain and contact of a state with its report; contact.at and .move are used as room."""
     if couples(line):
-        call_observer(contact.observer[0], line, ends, state, contact, 0, 0)
         parts = contact.energy
+        observed = Observed(contact.at, contact.move, parts)
+        observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
+        contact.counts.stale = 1
         held, stretched = parts[0] + parts[1] + parts[2], parts[3]
     else:
         held, stretched = energy_of_line(line, ends, state)

@@ -151,7 +151,6 @@ class Contact(NamedTuple):
     nodes: NDArray[np.int64]  # (N+1,) those in contact
     marks: NDArray[np.int64]  # (N+1,) 1 for those
     energy: Floats  # (5,) J, as kernels.march.energies has it
-    observer: NDArray[np.int64]  # (1,) address of what finds it where tension makes a torque; 0: it makes none
     power: Floats  # (RATES,) W, where the try has led
     x: Floats  # (N+1, 4) m, displacements in products, and spins of cells, rad
     y: Floats  # (N+1, 4) N, N m
@@ -186,8 +185,7 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False, lines: in
         counts=ContactCounts(), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
         pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
         move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64), energy=z(5),
-        observer=z(1, np.int64), power=z(RATES),
-        x=z((nodes, 4)), y=z((nodes, 4)), z=z((nodes, 5)), sweep=z((nodes, SWEEP)),
+        power=z(RATES), x=z((nodes, 4)), y=z((nodes, 4)), z=z((nodes, 5)), sweep=z((nodes, SWEEP)),
         basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
         holds=z((held, HOLD)), arms=z((held, 4, ARM)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
         links=z(held, np.int64),

@@ -78,7 +78,7 @@ from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.line_step import CORRECTION, LARGEST_TURN, pass_torque, read
+from hybrid.kernels.step.line_step import CORRECTION, LARGEST_TURN, read, twist_zones
 
 # Columns of S; its rows are as the first of them.
 TENSION = 0  # of the start
@@ -536,7 +536,7 @@ def correct_torques(network):
     """Corrections of lines with the torque through their catenary zones."""
     for l in range(network.tables.shape[0]):
         job = read(network.tables[l])
-        pass_torque(1, job, job.new, CORRECT, network.asked.scheme_cv)
+        twist_zones(1, job, job.new, CORRECT, network.asked.scheme_cv)
 
 
 @inner

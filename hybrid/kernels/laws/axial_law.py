@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
-from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
+from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.state.report import LOST_WORK, STRETCH_ENERGY
 from hybrid.kernels.state.state import WORKING, blank_state, on_line
 
@@ -212,7 +212,7 @@ def sliding_power(line, state, i, fast):
     return (state.T[i] - mean) / line.law[i, RELAXATION] * fast * (c - 1.0 / E - 0.5 * fast * b / (E * E))
 
 
-@kernel
+@inner
 def linearise_law(line, old, new, work, dt, t):
     """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`.
 
@@ -273,7 +273,6 @@ def linearise_law(line, old, new, work, dt, t):
         law[i, LOSS] += h * sliding_power(line, new, i, fast)
     work.report[STRETCH_ENERGY] = energy
     work.report[LOST_WORK] = -lost
-    return 0
 
 
 @inner

@@ -70,8 +70,8 @@ from hybrid.kernels.laws.element import (
     turns_freely,
 )
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
-from hybrid.kernels.state.report import BENDING_LAW, BENDING_SLIP, LOST_WORK
-from hybrid.kernels.state.state import on_line
+from hybrid.kernels.state.report import AXIAL_LAW, BENDING_LAW, BENDING_SLIP, LOST_WORK
+from hybrid.kernels.state.state import blank_state, no_ends, no_work, on_line
 
 # Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m, below 0 of an elastic one; mT, m; KT, m2.  K0, KT 0: none (as
 # behind the last).  Behind those of a clamp with an angular spring, where there is none, m0 is its give, rad/(N m).
@@ -288,7 +288,7 @@ def stiffen_beside_spring(line, new, i, x, y):
     return before - slip_answer(line, i, x, y)[5]
 
 
-@kernel
+@linked_kernel(on_line(no_ends(), blank_state(1), blank_state(1), no_work(), 0))
 def update_slip(line, ends, old, new, work, part):
     """IN_MOTION, LOADED_FIRST: how far layers have slipped before, and what they bear, for the march.
 
@@ -333,8 +333,7 @@ def update_slip(line, ends, old, new, work, part):
         if give > 0.0 and part == BEHIND_STEP:
             lost += stiffen_beside_spring(line, new, i, whole[0], whole[1])
     if part == BEHIND_STEP:
-        work.report[LOST_WORK] = (work.report[LOST_WORK] if line.law_at.shape[0] > 0 else 0.0) - lost
-    return 0
+        work.report[LOST_WORK] = (work.report[LOST_WORK] if line.bits & AXIAL_LAW else 0.0) - lost
 
 
 # Columns of Line.bend_law: of the half cells before and after a node, their first row in Line.bend_table, the row

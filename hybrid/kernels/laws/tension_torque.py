@@ -74,7 +74,7 @@ from hybrid.kernels.laws.axial_law import (
 from hybrid.kernels.laws.element import chord, relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import LOST_WORK, STIFFNESS_DAMPING, STRETCH_ENERGY
-from hybrid.kernels.state.state import ROWS, blank_line, blank_state
+from hybrid.kernels.state.state import ROWS, blank_line, blank_state, no_work, on_line
 
 # Columns of Work.couple, of the element at a node.
 AXIS = 0  # 3, kb p
@@ -420,13 +420,20 @@ def lost_by_peak(line, old, new, couple, i, dt, damped):
     return lost_in_step(line, old, new, i, peak_before(line.law, i, old), before, after)
 
 
-@kernel
-def linearise_law_with_torque(line, old, new, work, dt, t):
-    """As kernels.laws.axial_law.linearise_law, which linearises the laws; energy, work and losses with the twist.
+@linked_kernel(on_line(blank_state(1), blank_state(1), no_work(), 0.0, 0.0))
+def linearise_stretch(line, old, new, work, dt, t):
+    """As kernels.laws.axial_law.linearise_law; where tension makes a torque, with what that changes."""
+    linearise_law(line, old, new, work, dt, t)
+    if couples(line):
+        count_twist(line, old, new, work, dt, t)
+
+
+@linked_kernel(on_line(blank_state(1), blank_state(1), no_work(), 0.0, 0.0))
+def count_twist(line, old, new, work, dt, t):
+    """Energy, work and losses of laws that have been linearised, with the twist.
 
     Rates of twist are those of the last march (work.couple); what damping takes out of stretch is booked there.
     """
-    linearise_law(line, old, new, work, dt, t)
     law, energy, lost, couple = line.law, 0.0, 0.0, work.couple
     for i in range(line.h.shape[0]):
         law[i, LOSS] = 0.0
@@ -450,4 +457,3 @@ def linearise_law_with_torque(line, old, new, work, dt, t):
             lost += h * lost_by_peak(line, old, new, couple, i, dt, damped)
     work.report[STRETCH_ENERGY] = energy
     work.report[LOST_WORK] = -lost
-    return 0

@@ -116,16 +116,6 @@ def call_function(returned: Any) -> Any:
     return call
 
 
-def call_function_of_six(returned: Any) -> Any:
-    """The same with six arguments."""
-    result = typeof(returned)
-
-    def call(typingctx: Any, address: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> Any:
-        return result(types.int64, a, b, c, d, e, f), _call
-
-    return call
-
-
 @cache
 def _function_type(of: Intrinsic) -> Any:
     """The type of an intrinsic function."""

@@ -60,11 +60,6 @@ def caller(returned: Any) -> Any:
     return Intrinsic("call_function", returned)
 
 
-def caller_of_six(returned: Any) -> Any:
-    """The same with six arguments, call(address, a, b, c, d, e, f)."""
-    return Intrinsic("call_function_of_six", returned)
-
-
 def rows(example: Any) -> Any:
     """A function for kernels: rows(value, at, columns) -> an array of float64, (n, columns), of a NamedTuple.
 

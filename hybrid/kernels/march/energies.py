@@ -186,7 +186,7 @@ def find_powers(line, ends, velocity, state, report, power):
 @inner
 def loses(line):
     """Whether stretch or bend of a line may lose work that a step reports: ropes that remember, layers that slip."""
-    return line.law_at.shape[0] > 0 or (line.bits & BENDING_SLIP) != 0
+    return line.bits & (AXIAL_LAW | BENDING_SLIP) != 0
 
 
 @inner

@@ -12,7 +12,7 @@ before it, carried along the chords by the smallest rotations, and counted beyon
 It answers to the spins of the cells beside it and to all chords:
     d turn = dpsi_after - dpsi_before + sum c_i.(de_{i-1}/l_{i-1} + de_i/l_i).
 That couples two cells far apart, which the march does not know: its solution is corrected by that of a small dense
-network.  Newton calls `pass_torque` by its address, so that lines without such zones compile none of it.
+network.
 
 Where zones change, rods get new directors and zones new turns.  Along the old line the twist is known everywhere: how
 far its directors turn against one that is carried along the chords by the smallest rotations, and in zones the share of
@@ -32,10 +32,10 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale,
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples, damped_compliance, twist_of_tensions
 from hybrid.kernels.laws.tension_torque import TORQUE as NODE_TORQUE
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.state.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING, STIFFNESS_DAMPING_POWER
-from hybrid.kernels.state.state import Floats, Line, Torsion, no_torsion
+from hybrid.kernels.state.state import Floats, Line, Torsion, blank_state, no_ends, no_torsion, no_work, on_line
 
 # Parts of `pass_torque`.
 BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
@@ -351,7 +351,7 @@ def correct(line, state, work, cv, joined):
         state.turn[z, TURN] += change / damped_part(line, z, cv)
 
 
-@kernel
+@linked_kernel(on_line(no_ends(), blank_state(1), no_work(), 0, 0.0))
 def pass_torque(line, ends, state, work, part, cv):
     """A part of Newton's iteration for a line whose state has turns; cv: dv'/dr' of the scheme, 1/s.
 
@@ -377,7 +377,6 @@ def pass_torque(line, ends, state, work, part, cv):
         other = cv == 0.0 or not abs(known[OF_CV] - cv) <= SAME_STEP * cv
         known[KEEPS_NOW] = 1.0 if other or known[SERVED] >= SERVES or known[OF_STEP] > ITERATIONS else 0.0
         find_torques(line, ends, state, work)
-    return 0
 
 
 @inner
@@ -426,7 +425,7 @@ def torsion_of(line: Line, keep: bool) -> Torsion:
     passed = z((2, n))
     passed[HOLD, floating] = 1.0 / line.torsion[:, COMPLIANCE].min()
     return Torsion(
-        address=0, passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
+        passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
         columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), right=z((n + 1, SIZE)),
         coupling=z((unknowns, unknowns)), dense=z((unknowns, unknowns + 1)),
     )  # fmt: skip

@@ -8,7 +8,6 @@ a table of addresses (kernels.machine.binding).
 from __future__ import annotations
 
 import threading
-from functools import cache
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.march import LANES, ROWS
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
+from hybrid.kernels.march.zone_torque import torsion_of
 from hybrid.kernels.run.newton import solve
 from hybrid.kernels.state.report import FREE, PLANAR, REMEMBERS, REPORT_SIZE
 from hybrid.kernels.state.state import (
@@ -29,9 +28,6 @@ from hybrid.kernels.state.state import (
     Sea,
     State,
     Work,
-    blank_line,
-    blank_state,
-    no_ends,
     no_torsion,
     remembers,
     slip_size,
@@ -142,14 +138,8 @@ def workspace_of(line: Line, keep: bool = False) -> Work:
     if line.tension_twist.size:
         work = work._replace(couple=np.zeros((line.s.size, COUPLES)))
     if line.torsion.size and not line.bits & PLANAR:
-        work = work._replace(torsion=torsion_of(line, keep)._replace(address=_torque_address()))
+        work = work._replace(torsion=torsion_of(line, keep))
     return work
-
-
-@cache
-def _torque_address() -> int:
-    """Of what passes torques through zones, the same for all lines; it takes a millisecond to find: once."""
-    return int(pass_torque.address(blank_line(1), no_ends(), blank_state(1), workspace(1), 0, 0.0))
 
 
 def workspace(n_cells: int, keep: bool = False) -> Work:

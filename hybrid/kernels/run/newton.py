@@ -71,13 +71,13 @@ from hybrid.kernels.step.line_step import (
     couple,
     end_line_step,
     has_converged,
-    pass_torque,
     prepare,
     read,
     round_off_tension,
     rubs,
     safe_part,
     size_of,
+    twist_zones,
     with_radius,
 )
 from hybrid.kernels.step.step import find_rates
@@ -213,7 +213,7 @@ def solve(plane, space, task, job, states):
         find_rates(space, line, job.sea, states.old, new, work.u, s)
     if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
         carry(job, states, s, task.what)
-    pass_torque(space, job, new, AFTER_STEP, s.cv)
+    twist_zones(space, job, new, AFTER_STEP, s.cv)
     if task.what == STEP and outcome == OK:
         far, turn, cell = end_line_step(plane, space, task, job, states, s)
         if far:

@@ -211,6 +211,8 @@ BENDING_LAW = 131072
 VORTICES = 262144
 # No force: layers of a section that slip on each other as it bends (hybrid.kernels.laws.bending_law).
 BENDING_SLIP = 1048576
+# Nor is this: they stay as Line.slip_now has them, whatever the line does.
+HELD_SLIP = 16777216
 # Bed that remembers (hybrid.kernels.laws.soil): in place of the linear one; no force: friction that falls as a line slides.
 SOIL = 2097152
 BREAKOUT = 4194304

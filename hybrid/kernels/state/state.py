@@ -104,7 +104,6 @@ NO_WAKE_LAW: Floats = np.zeros((0, 8))
 NO_WAKE: Floats = np.zeros((0, 4))
 NO_SLOW: Floats = np.zeros(0)
 NO_PEAK: Floats = np.zeros(0)
-NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
 NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
 # Of a scene in which no obstacle moves (kernels.state.report has the columns).
 NO_CARRIED: Floats = np.zeros((0, CARRIED))
@@ -170,9 +169,6 @@ class Line(NamedTuple):
     # (N, 13) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
     law: Annotated[Floats, cell(columns=14, optional=True)] = NO_LAW
     law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
-    law_at: NDArray[np.int64] = (
-        NO_ADDRESS  # (1,) address of kernels.laws.axial_law.linearise_law; empty: there is no such cell
-    )
     # (N,) of sections in which tension makes a torque (kernels.laws.tension_torque): torque by tension, N m per N; twist of half
     # a cell by tension, rad/N; empty: there are none
     tension_torque: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
@@ -186,7 +182,6 @@ class Line(NamedTuple):
     # every march; empty: there are none
     slip_law: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
     slip_now: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
-    slip_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.laws.bending_law.update_slip; empty: none
     # (N+1, 2 L) 1/m, by how much State.layers is another in a step because material flows past nodes
     # (kernels.reel.paid_length); empty: the line is not paid out
     slip_flow: Annotated[Floats, node(columns=2, optional=True)] = NO_SLIP_FLOW
@@ -425,7 +420,6 @@ def ends_in(batch: Batch, k: int) -> Ends:
 class Torsion(NamedTuple):
     """What a torque through K catenary zones takes beside the march (kernels.march.zone_torque); empty: there is none."""
 
-    address: int  # of kernels.march.zone_torque.pass_torque; 0: there is none
     passed: Floats  # (2, N) N m of cells of rods beside zones: torque on their spin; stiffness that holds it meanwhile
     slope: Floats  # (N, 3) 1/m, how the turn of the zone of a cell, or beside it, answers to its chord
     directions: Floats  # (K, 2, 3) how it answers to the directions of ends that hold the zone
@@ -461,7 +455,7 @@ def no_torsion() -> Torsion:
     """No torque passes through catenary zones."""
     z = np.zeros
     return Torsion(
-        0, z((2, 0)), z((0, 3)), z((0, 2, 3)), z(0, np.int64), z((0, 0, 5)), z(0), z((0, 5)), z((0, 0)), z((0, 1))
+        z((2, 0)), z((0, 3)), z((0, 2, 3)), z(0, np.int64), z((0, 0, 5)), z(0), z((0, 5)), z((0, 0)), z((0, 1))
     )
 
 

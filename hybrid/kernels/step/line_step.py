@@ -28,13 +28,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
+from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST, update_slip
+from hybrid.kernels.laws.tension_torque import linearise_stretch
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.machine.references import caller, caller_of_six, reader
+from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.march import AT_REST
-from hybrid.kernels.march.zone_torque import BEFORE_MARCH, CORRECT
+from hybrid.kernels.march.zone_torque import BEFORE_MARCH, CORRECT, pass_torque
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.report import FRICTION, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.report import AXIAL_LAW, BENDING_SLIP, FRICTION, HELD_SLIP, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import (
     Ends,
     Floats,
@@ -202,10 +203,6 @@ read = reader(blank_job())
 call_solver, call_follower, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0)
 call_quantities = caller(0)
 
-call_torque = caller_of_six(0)
-call_law = caller_of_six(0)
-call_slip = caller_of_six(0)
-
 
 @inner
 def size_of(turn, shift, pull, big, limits, noise):
@@ -222,28 +219,28 @@ def size_of(turn, shift, pull, big, limits, noise):
 
 
 @inner
-def pass_torque(space, job, state, part, cv):
+def twist_zones(space, job, state, part, cv):
     """A part of what a torque through catenary zones takes (kernels.march.zone_torque), where there is one."""
     if space is not None:
-        if job.work.torsion.address != 0:
-            call_torque(job.work.torsion.address, job.line, job.ends, state, job.work, part, cv)
+        if job.work.torsion.known.shape[0] != 0:
+            pass_torque(job.line, job.ends, state, job.work, part, cv)
 
 
 @inner
-def linearise_law(job, states, s):
+def stretch_by_law(job, states, s):
     """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law)."""
-    if job.line.law_at.shape[0] != 0:
+    if job.line.bits & AXIAL_LAW:
         dt = s.dt
         if not dt > 0.0 and not (s.cv == 0.0 and s.ca < AT_REST):
             dt = -1.0
-        call_law(job.line.law_at[0], job.line, states.old, states.new, job.work, dt, job.sea.now[0])
+        linearise_stretch(job.line, states.old, states.new, job.work, dt, job.sea.now[0])
 
 
 @inner
 def pass_slip(job, states, part):
     """A part of what layers that slip on each other take (kernels.laws.bending_law), if there are any."""
-    if job.line.slip_at.shape[0] != 0:
-        call_slip(job.line.slip_at[0], job.line, job.ends, states.old, states.new, job.work, part)
+    if job.line.bits & (BENDING_SLIP | HELD_SLIP) == BENDING_SLIP:
+        update_slip(job.line, job.ends, states.old, states.new, job.work, part)
 
 
 @inner
@@ -297,8 +294,8 @@ def prepare(job, rho):
 @inner
 def before_march(space, job, states, s, what):
     """What borders do to the equations of the configuration, before they are assembled."""
-    pass_torque(space, job, states.new, BEFORE_MARCH, s.cv)
-    linearise_law(job, states, s)
+    twist_zones(space, job, states.new, BEFORE_MARCH, s.cv)
+    stretch_by_law(job, states, s)
     pass_slip(job, states, IN_MOTION if s.dt > 0.0 or s.cv != 0.0 or s.ca >= AT_REST else LOADED_FIRST)
     if what == STEP:
         wind(job)
@@ -314,7 +311,7 @@ def after_march(job, what):
 @inner
 def couple(space, job, states, s, what, good):
     """Put borders into a correction that was found without them, and is `good` if it is finite; False: that fails."""
-    pass_torque(space, job, states.new, CORRECT, s.cv)
+    twist_zones(space, job, states.new, CORRECT, s.cv)
     if good and what != CORRECTION and touches(job):
         return ask_contact(job, TOUCH) > 0.0
     return True
@@ -329,7 +326,7 @@ def safe_part(job):
 @inner
 def carry(job, states, s, what):
     """What they remember goes to where a solution has led."""
-    linearise_law(job, states, s)
+    stretch_by_law(job, states, s)
     if what in (STEP, EQUILIBRIUM):
         pass_slip(job, states, BEHIND_STEP if what == STEP else BEHIND_REST)
 
