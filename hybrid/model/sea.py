@@ -153,7 +153,7 @@ def _moved(scene: LineScene, cells: int, around: Surroundings) -> Surroundings:
     if not courses.carried.size:
         return around
     grip = np.zeros((cells + 1, EACH * len(sea.obstacles)))
-    rolling = np.zeros((3 * int((courses.carried[:, INERTIA] > 0.0).sum()), cells + 1, 5))
+    rolling = np.zeros((2 * int((courses.carried[:, INERTIA] > 0.0).sum()), cells + 1, 5))
     return Surroundings(
         sea._replace(courses=courses.moves, carried=courses.carried, grip=grip, rolling=rolling),
         around.names,

@@ -23,7 +23,7 @@ from hybrid.kernels.junctions.joined_lines import ANSWER, COLUMNS, FUNCTIONAL, T
 from hybrid.kernels.junctions.junctions import HANDED, join_lines, twist_lines
 from hybrid.kernels.junctions.lines_contact import blank_touching_job, room_for_products, touch_network
 from hybrid.kernels.junctions.network_job import blank_network_job
-from hybrid.kernels.junctions.sheaves_and_winches import blank_spinning_job, blank_winding_job, spin_sheaves, wind_lines
+from hybrid.kernels.junctions.sheaves_and_winches import EACH_UNKNOWN, blank_unknowns_job, spin_sheaves, wind_lines
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats
 from hybrid.solve.stepper import JoinedLine
@@ -41,8 +41,8 @@ class Border(NamedTuple):
 BORDERS = {
     "joints": Border(join_lines, blank_border_job),
     "shapes": Border(meet_bodies, blank_meeting_job),
-    "winches": Border(wind_lines, blank_winding_job),
-    "sheaves": Border(spin_sheaves, blank_spinning_job),
+    "winches": Border(wind_lines, blank_unknowns_job),
+    "sheaves": Border(spin_sheaves, blank_unknowns_job),
     "torques": Border(twist_lines, blank_border_job),
     "contact": Border(touch_network, blank_touching_job),
 }
@@ -151,15 +151,11 @@ def room_to_meet(nodes: int, rides: NDArray[np.int64], bodies: int) -> Values:
     }  # fmt: skip
 
 
-def room_to_wind(winches: int, nodes: int, bodies: int) -> Values:
-    """Room of winches that give of joined lines what keeps their tension."""
-    own = {"lengthened": np.zeros((winches, nodes, SIZE)), "drawn": np.zeros((winches, bodies, 6))}
-    return own | room_to_keep(nodes, bodies)
-
-
-def room_to_spin(sheaves: int, nodes: int, bodies: int) -> Values:
-    """Room of sheaves that lines turn."""
-    return {"turned": np.zeros((sheaves, bodies, 6))} | room_to_keep(nodes, bodies)
+def room_of_unknowns(size: int, nodes: int, bodies: int) -> Values:
+    """Room of so many sheaves that lines turn, or winches that give of joined lines what keeps their tension."""
+    answers = {"answers": np.zeros((size, nodes, SIZE)), "carried": np.zeros((size, bodies, 6))}
+    rows = {"listed": np.zeros(1, np.int64), "unknowns": np.zeros((size, EACH_UNKNOWN))}
+    return rows | answers | room_to_keep(nodes, bodies)
 
 
 def room_to_keep(nodes: int, bodies: int) -> Values:

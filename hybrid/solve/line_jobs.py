@@ -29,10 +29,9 @@ from hybrid.solve.borders import (
     Rooms,
     contact_of,
     room_of_joints,
+    room_of_unknowns,
     room_to_meet,
-    room_to_spin,
     room_to_touch,
-    room_to_wind,
 )
 from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
@@ -143,9 +142,9 @@ class LineJobs:
         if self._rides.size:
             borders["shapes"] = self._pressed
         if self._winches:
-            borders["winches"] = room_to_wind(self._winches, nodes, len(bodies))
+            borders["winches"] = room_of_unknowns(self._winches, nodes, len(bodies))
         if self._sheaves:
-            borders["sheaves"] = room_to_spin(self._sheaves, nodes, len(bodies))
+            borders["sheaves"] = room_of_unknowns(self._sheaves, nodes, len(bodies))
         rows = {
             "joints": self.joints, "seats": self._seats, "arms": self._arms, "fairleads": self._fairleads,
             "gaps": self._gaps, "still": np.zeros_like(self._gaps), "allowed": self.allowed,

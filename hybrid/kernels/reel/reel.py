@@ -58,15 +58,13 @@ class ReelStage(NamedNumbers):
     flow_known: float
     # Of a winch that holds a tension, of a line with a joined end (kernels.junctions.sheaves_and_winches): what is asked of it;
     # the block row of the cell that grows, and what its length puts there per m; the block row with the tension before the
-    # fairlead; N out of balance at the rotor, and how that grows with the length, N/m, by itself and with the answer of all
-    # lines, points and bodies.
+    # fairlead; N out of balance at the rotor, and how that grows with the length by itself, N/m.
     lengthens: float
     grows_at: float
     puts: float
     pulls_at: float
     out_of_balance: float
     alone: float
-    yielding: float
     change: float  # m, of the length
 
 

@@ -89,16 +89,13 @@ BEARING = 36  # its damping, N m s
 ROLLED_BEFORE = 37  # angle at the begin of the step, rad
 ROLLED = 38  # and at its end, rad
 ROLLING = 39  # its rate, 1/s
-LEFT_OVER = 46  # residual moment, N m
-ALONE = 47  # its derivative by the angle where the line stays, N m (0: the sheave is held)
-YIELDING = 48  # and where it yields, N m
 # Of a line that is fixed to the body which carries an obstacle, and of what a body carries.
 MEETS_FROM = 40  # arc length from which it meets that, m
 MEETS_TO = 41  # and up to which, m
 OFFSET = 42  # 3, its place in axes of the body, as the axis at t = 0 and what is across are
 RIDES = 45  # 1.0: a body carries it
-STILL_SIDE = 49
-CARRIED = 52
+STILL_SIDE = 46
+CARRIED = 49
 # Of Line.moved.
 FIXED, MOVES, FREE = range(3)
 # Columns of a row of State.sheave.

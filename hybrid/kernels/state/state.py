@@ -285,7 +285,7 @@ class Sea(NamedTuple):
     courses: Moves  # how obstacles move, a row each; empty: none does
     carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacles); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
-    rolling: Floats  # (3 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
+    rolling: Floats  # (2 K, N+1, 5) -p and q of K sheaves that turn freely (kernels.laws.sheaves)
     boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.report); empty: no obstacle has any
     facets: Floats = NO_FACETS  # (F, FACET) of surfaces of triangles, in axes of their obstacles
     soil: Floats = NO_SLOW  # of a bed that remembers (kernels.laws.soil); empty: it does not
