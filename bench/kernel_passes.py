@@ -1,7 +1,7 @@
 """Where compiling a kernel takes its time: processor time by step of numba, each without what it calls.
 
-    python bench/kernel_passes.py                                  run.entry.in_space, reel.payout.stand_still
-    python bench/kernel_passes.py run.entry.in_plane run.entry.in_space    in this order, in one process
+    python bench/kernel_passes.py                                  run.newton.in_space, reel.payout.stand_still
+    python bench/kernel_passes.py run.newton.in_plane run.newton.in_space    in this order, in one process
 
 All are compiled from nothing; what two kernels share is read with the first.  `llvm_lock` is time in LLVM: parsing,
 optimising and machine code; the others are numba's own steps, in Python.
@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numba.core import event
 
-USUAL = ("run.entry.in_space", "reel.payout.stand_still")
+USUAL = ("run.newton.in_space", "reel.payout.stand_still")
 SHOWN = 8
 
 

@@ -19,7 +19,7 @@ from scipy.linalg import solve_banded
 import hybrid
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, eliminate_wide, substitute
 from hybrid.kernels.machine import compiler
-from hybrid.kernels.run.entry import assembly, block_rows
+from hybrid.kernels.run.newton import assembly, block_rows
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 

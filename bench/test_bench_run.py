@@ -21,8 +21,8 @@ from peers.hybrid_touchdown import described
 from problems import StepsOfLine, at_rest
 
 import hybrid
-from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import NO_PUSH, workspace_of
+from hybrid.kernels.run import newton
+from hybrid.kernels.run.newton import NO_PUSH, workspace_of
 from hybrid.kernels.step.step import States
 from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build, planar, untwist
@@ -70,7 +70,7 @@ def kernel_time(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
 
     monkeypatch.setattr(NetworkSteps, "go", timed(NetworkSteps.go, "run"))
     for room, name in (
-        (entry, "in_plane"), (entry, "in_space"), (observed_outputs, "observe_outputs"), (observed_states, "add_rows"),
+        (newton, "in_plane"), (newton, "in_space"), (observed_outputs, "observe_outputs"), (observed_states, "add_rows"),
     ):  # fmt: skip
         monkeypatch.setattr(room, name, timed(getattr(room, name), "other"))
     return times
@@ -163,8 +163,8 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         begin = time.process_time()
         for k in range(1, steps + 1):
             sea, ends, old, new, was, now = model.sea.at_time(0.1 * k), model.ends.at_time(0.1 * k), new, old, now, was
-            task = entry.step_task(0.1, 0.1 * (k > 1), 0.5, limits, 0.5)
-            outcome, iterations, *_ = entry.step(task, line, sea, ends, States(old, new, was, now), work)
+            task = newton.step_task(0.1, 0.1 * (k > 1), 0.5, limits, 0.5)
+            outcome, iterations, *_ = newton.step(task, line, sea, ends, States(old, new, was, now), work)
             assert outcome == hybrid.Outcome.OK
             total += iterations
         return time.process_time() - begin, total
@@ -175,7 +175,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
     assert model.plane is not None
     line = planar(model.line, model.plane)
     untwist(line, ends, model.cable.held_tangent, start)
-    limits, work = entry.Limits(REACH * model.length, model.tension_scale, MOST_ITERATIONS), workspace_of(line)
+    limits, work = newton.Limits(REACH * model.length, model.tension_scale, MOST_ITERATIONS), workspace_of(line)
     StepsOfLine(model, line).begin(start)
     spent(scenes[0])
     each: dict[str, list[float]] = {"run": [], "solver": [], "watched": []}

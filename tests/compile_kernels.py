@@ -39,7 +39,7 @@ LINES = network_scene(
 
 # The longest first: who comes second to a kernel loads it, or waits.
 BY_TABLE = {
-    "solvers": """run.entry.in_space run.entry.in_plane run.newton.solve_network run.network.begin_line
+    "solvers": """run.newton.in_space run.newton.in_plane run.newton.solve_network run.network.begin_line
         run.network_run.sample_network run.network.book_network_step""",
     "rest": """mesh.zone_step.advance_zones mesh.cell_changes.begin_switch mesh.cell_changes.end_switch
         mesh.zone_step.plan_nodes mesh.zone_step.read_arcs mesh.zone_transfer.transfer mesh.cell_changes.plan_cells

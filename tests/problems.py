@@ -35,7 +35,7 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, j0
 from hybrid import Scene
 from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.run.entry import assembly, block_rows, workspace
+from hybrid.kernels.run.newton import assembly, block_rows, workspace
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.build import Model, build

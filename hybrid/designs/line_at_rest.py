@@ -15,7 +15,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import TORQUE
-from hybrid.kernels.run.entry import assembly, workspace_of
+from hybrid.kernels.run.newton import assembly, workspace_of
 from hybrid.kernels.state.report import FRICTION, MOMENT_A, NET_A, PLANAR, WAVES
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
 from hybrid.linear.matrices import ANCHOR, load_layers

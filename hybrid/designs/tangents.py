@@ -24,7 +24,6 @@ from hybrid.designs.replay import Places, at_nodes
 from hybrid.kernels.junctions.bodies import FRAME, MASS, PIECES, V, W, X
 from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.entry import workspace
 from hybrid.kernels.run.network_tangents import (
     A_OF,
     TANGENTS,
@@ -38,6 +37,7 @@ from hybrid.kernels.run.network_tangents import (
     blank_network_tangents,
     correct_beside,
 )
+from hybrid.kernels.run.newton import workspace
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, Clock, Counts, blank_books, sample_size
 from hybrid.kernels.state.report import ASSEMBLED, FRICTION, PLANAR, SELF_CONTACT, SOIL, VORTICES, WAVES

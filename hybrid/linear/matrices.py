@@ -46,11 +46,11 @@ from hybrid.kernels.laws.bending_law import (
     update_slip,
 )
 from hybrid.kernels.laws.bending_law import PER_TENSION as SLIP_PER_TENSION
-from hybrid.kernels.laws.soil import BRANCH, DEPTH, PRESSES, TURN_P, UP, rest_in_soil
-from hybrid.kernels.laws.soil import TURN as TURN_DEPTH
+from hybrid.kernels.laws.seabed import BRANCH, DEPTH, PRESSES, TURN_P, UP, rest_in_soil
+from hybrid.kernels.laws.seabed import TURN as TURN_DEPTH
 from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
-from hybrid.kernels.run import entry
+from hybrid.kernels.run import newton
 from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, HELD_SLIP, MOMENT_A, PLANAR, ROTARY, SOIL, WAVES
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, no_torsion
 from hybrid.kernels.step.step import friction_axes
@@ -321,7 +321,7 @@ class RestMarch:
     """Marches along one line at rest: as `rows_at_rest`, in many seas."""
 
     def __init__(self, line: Line, ends: Ends, state: State, rows: Floats) -> None:
-        self.work = entry.workspace_of(line)._replace(rows=rows, torsion=no_torsion())
+        self.work = newton.workspace_of(line)._replace(rows=rows, torsion=no_torsion())
         still = state.copy()
         for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
             rate[:] = 0.0
@@ -330,7 +330,7 @@ class RestMarch:
 
     def __call__(self, sea: Sea, c: tuple[float, float]) -> Floats:
         """Fill the rows in a sea; its report."""
-        entry.assembly(self.line, sea, self.ends, self.state, *c, self.work)
+        newton.assembly(self.line, sea, self.ends, self.state, *c, self.work)
         return self.work.report
 
 

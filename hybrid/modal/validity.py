@@ -20,8 +20,7 @@ from hybrid.kernels.laws.axial_law import DYNAMIC, STRAIN, TENSION
 from hybrid.kernels.laws.bending_law import EACH, PER_TENSION, STIFF, TABLE_MOMENT
 from hybrid.kernels.laws.bending_law import TABLE_MOMENT as SLIPS_AT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
-from hybrid.kernels.laws.seabed import planes_under
-from hybrid.kernels.laws.soil import DEPTH, PRESSES, STEEP, SUCTION
+from hybrid.kernels.laws.seabed import DEPTH, PRESSES, STEEP, SUCTION, planes_under
 from hybrid.kernels.state.report import OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.loaded_line import STRAIGHT, LoadedLine, LoadedMembers, current_at

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.laws.drag_law import body, half_cell, split
 from hybrid.kernels.laws.obstacles import distances
+from hybrid.kernels.laws.water import body, half_cell, split
 from hybrid.kernels.state.report import BODIES, DRAG, FLOW, OBSTACLES, SURFACE
 from hybrid.kernels.state.state import Floats, Line, Sea, State, state_for
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
@@ -233,11 +233,11 @@ def current_drag(line: Line, sea: Sea, r: Floats) -> Floats:
     if line.bits & DRAG:
         n = line.h.size
         for side in (slice(0, n), slice(1, n + 1)):
-            ut, un, square = split([x[side] for x in u], d)
-            force, _, _ = half_cell(ut, un, np.abs(ut), np.sqrt(square), d, line.drag_n, line.drag_t)
+            ut, un, square = split.py_func([x[side] for x in u], d)
+            force, _, _ = half_cell.py_func(ut, un, np.abs(ut), np.sqrt(square), d, line.drag_n, line.drag_t)
             f[side] += np.column_stack(force)
     if line.bits & BODIES:
-        f += np.column_stack(body(u, np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2), line.point_drag)[0])
+        f += np.column_stack(body.py_func(u, np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2), line.point_drag)[0])
     return f
 
 

@@ -20,7 +20,7 @@ from hybrid.kernels.laws.bending_law import (
     LAST_B,
 )
 from hybrid.kernels.laws.element import NO_SPRING
-from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
+from hybrid.kernels.laws.water import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.remesh import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
 from hybrid.kernels.state.report import (

@@ -143,7 +143,7 @@ class Material:
 
     @property
     def kinks_count(self) -> str:
-        """What the line has by which kinks of joints count as bends (kernels.watch.soft_rods); "": nothing."""
+        """What the line has by which kinks of joints count as bends (kernels.watch.sides); "": nothing."""
         if any(self.bends or ()):
             return "tables of moment"
         if self.layered:

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import SceneError, refuse_value
-from hybrid.kernels.reel import winch as w
-from hybrid.kernels.reel.reel import LEAVES
+from hybrid.kernels.reel.reel import LEAVES, Winch
 from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import Floats, Line, slip_size
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
@@ -87,7 +86,7 @@ class PayoutPlan:
     cable: Material  # what is out and what is on the reel
     pieces: Floats  # (P, 1 + COLUMNS) as of kernels.reel.reel.Reel
     from_outside: bool  # whether the length is set from Python
-    winch: w.Winch  # before its brake opens; of zeros where none holds a tension
+    winch: Winch  # before its brake opens; of zeros where none holds a tension
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes are that ride with it; 0 is the last
     begun: Floats  # (N+1,) m, nodes at t = 0
 
@@ -368,9 +367,9 @@ def shorter_behind_clamp(scene: LineScene, cable: Material, base: Floats, share:
     return side if winch_side(scene) else scene.length - side[::-1]
 
 
-def winch_of(payout: Payout, length: float) -> w.Winch:
-    """Numbers of a winch that holds a tension (kernels.reel.winch), at rest with a length, m, that is out."""
-    out, winch = w.Winch(), payout.winch
+def winch_of(payout: Payout, length: float) -> Winch:
+    """Numbers of a winch that holds a tension (kernels.reel.reel), at rest with a length, m, that is out."""
+    out, winch = Winch(), payout.winch
     if winch is not None:
         out.tension, out.begin, out.ramp = winch.tension, winch.begin, winch.ramp
         out.inertia, out.damping, out.max_rate = winch.inertia, winch.damping, winch.max_rate or np.inf

@@ -18,8 +18,7 @@ from hybrid.errors import refuse_value
 from hybrid.kernels.laws.water import still_below
 from hybrid.kernels.state.report import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.step_control import weights
-from hybrid.kernels.step.step_law import SAFETY
+from hybrid.kernels.step.step_control import SAFETY, weights
 from hybrid.model.build import Model, build
 from hybrid.model.contents import MEETS, Entry, that_may_meet, with_accuracy
 from hybrid.model.initial_shape import HUNG, hung

@@ -8,8 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hybrid.kernels.laws.obstacles import carry_obstacles
-from hybrid.kernels.laws.seabed import HEIGHTS
-from hybrid.kernels.laws.soil import LATERAL, LEFT_A, LEFT_L, NUMBERS, OVER, PART, STRENGTH, SUCTION, WEDGE
+from hybrid.kernels.laws.seabed import HEIGHTS, LATERAL, LEFT_A, LEFT_L, NUMBERS, OVER, PART, STRENGTH, SUCTION, WEDGE
 from hybrid.kernels.state.report import ANGLE, BREAKOUT, EACH, FRICTION, INERTIA, REMEMBERS, ROLLED, SEABED, SOIL
 from hybrid.kernels.state.state import NO_SLOW, Floats, Sea, State, no_sea, with_waves
 from hybrid.model.ends import DrivenEnd, rise

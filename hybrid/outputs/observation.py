@@ -30,7 +30,7 @@ from hybrid.kernels.contact.self_contact_law import FIRST, INNER, LAST, OUTER, W
 from hybrid.kernels.contact.self_contact_pairs import WINDOW, Contact
 from hybrid.kernels.contact.self_distance import NEIGHBOURS
 from hybrid.kernels.laws.obstacles import put_obstacles
-from hybrid.kernels.laws.soil import PRESSES
+from hybrid.kernels.laws.seabed import PRESSES
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.kernels.state.report import (

@@ -278,7 +278,7 @@ class Diagnostics:
             self.note(0.0, node, "several equilibria", text)
 
     def shape(self, t: float, sharp: Sequence[float], state: State) -> Stop:
-        """Bends and twists that the mesh does not resolve; `sharp`: what kernels.run.entry.sharpest has found."""
+        """Bends and twists that the mesh does not resolve; `sharp`: what kernels.run.newton.sharpest has found."""
         bend, twist = sharp[0], sharp[2]
         if bend <= self._bend and twist <= min(self._twist, LARGEST_TWIST):
             return None

@@ -25,7 +25,7 @@ from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene, reachable_obstacles
 
 # What is compiled together, by the kernel that stands for it: the last.
-SOLVER = ("run.entry.in_plane", "run.entry.in_space")
+SOLVER = ("run.newton.in_plane", "run.newton.in_space")
 OUTPUTS = "watch.observed_outputs.observe_outputs"
 ZONES = "mesh.zone_step.advance_zones"
 CRITERIA = "mesh.zone_step.evaluate_criteria"
@@ -164,7 +164,7 @@ def _compile_by_table(names: Sequence[str], *kernels: str) -> None:
 def payout_kernels() -> tuple[Any, ...]:
     """All that a line calls that is paid out, in the order in which a run asks for it; each takes one table."""
     from hybrid.kernels.mesh import cell_changes
-    from hybrid.kernels.reel import node_changes, payout, payout_nodes
+    from hybrid.kernels.reel import payout, payout_nodes
 
     first = (
         payout.pay_out,
@@ -178,8 +178,8 @@ def payout_kernels() -> tuple[Any, ...]:
         payout.remove_forces,
         payout_nodes.carry_node,
     )
-    line = node_changes.change_line, node_changes.fit_changed, node_changes.book_change, node_changes.renew_run
-    planner = node_changes.node_due, node_changes.plan_node, node_changes.keep_reel, node_changes.make_line
+    line = payout_nodes.change_line, payout_nodes.fit_changed, payout_nodes.book_change, payout_nodes.renew_run
+    planner = payout_nodes.node_due, payout_nodes.plan_node, payout_nodes.keep_reel, payout_nodes.make_line
     forces = cell_changes.before_forces, cell_changes.after_forces
     return *first, *line, *planner, *forces, put_cells, ask_cells, change_cells
 

@@ -14,7 +14,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.link import holds_twist
 from hybrid.kernels.march.zone_torque import answers_of
 from hybrid.kernels.mesh.zone_criteria import CRITERIA, twist_of_rods
-from hybrid.kernels.run.entry import sharpest
+from hybrid.kernels.run.newton import sharpest
 from hybrid.kernels.state.books import (
     HIDES_ITSELF,
     IS_BENT,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import IN_SPACE, PUSHED
-from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.newton import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import OBSTACLES, PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Line, State

@@ -11,12 +11,11 @@ import numpy as np
 
 from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.laws.obstacles import stored_energy
-from hybrid.kernels.laws.vortices import PHASE
+from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.reel.node_changes import energy_of
 from hybrid.kernels.reel.paid_length import carry_layers, length_at
 from hybrid.kernels.reel.payout import end_payout, fit_line, lengthen, put_forces_on, remove_forces
-from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
+from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, energy_of, put_places
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES

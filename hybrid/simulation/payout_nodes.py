@@ -10,13 +10,16 @@ import numpy as np
 
 from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.mesh import remesh as f
-from hybrid.kernels.reel.node_changes import (
+from hybrid.kernels.reel.payout import stand_still
+from hybrid.kernels.reel.payout_nodes import (
     OF_REEL,
+    CarryJob,
     NodeJob,
     blank_line_job,
     blank_node_job,
     blank_node_planner,
     book_change,
+    carry_node,
     change_line,
     fit_changed,
     keep_reel,
@@ -25,8 +28,6 @@ from hybrid.kernels.reel.node_changes import (
     plan_node,
     renew_run,
 )
-from hybrid.kernels.reel.payout import stand_still
-from hybrid.kernels.reel.payout_nodes import CarryJob, carry_node
 from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.state.report import REMEMBERS
 from hybrid.kernels.state.state import Batch, Line, Sea

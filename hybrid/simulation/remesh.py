@@ -20,8 +20,8 @@ from hybrid.kernels.contact.self_distance import Itself, blank_itself, blank_its
 from hybrid.kernels.machine.binding import Packed, Room, Table, address
 from hybrid.kernels.mesh import remesh as f
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
-from hybrid.kernels.run.entry import NO_PUSH, workspace
 from hybrid.kernels.run.network import begin_line
+from hybrid.kernels.run.newton import NO_PUSH, workspace
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import (

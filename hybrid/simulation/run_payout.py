@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.laws.vortices import PHASE
+from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.mesh.zone_criteria import soften
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, limit_next_step, pay_out, stand_among, stand_still
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay

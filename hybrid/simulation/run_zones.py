@@ -28,7 +28,7 @@ from hybrid.kernels.mesh.cell_changes import (
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME, blank_line_job, fill_line
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, advance_zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
-from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.newton import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Counts
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY

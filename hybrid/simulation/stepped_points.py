@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import solve_again
-from hybrid.kernels.run import entry
+from hybrid.kernels.run import newton
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B, PLANAR
 from hybrid.kernels.state.state import Floats, State
@@ -499,10 +499,10 @@ def interface_stiffness(model: Model, k: int, states: tuple[State, State], taken
     ends = model.ends.values
     held = ends.held.copy()
     held[k] = 0
-    work = entry.workspace_of(line, keep=True)
+    work = newton.workspace_of(line, keep=True)
     old, new = states
     work.u[:] = new.r - old.r if taken.dt > 0.0 else 0.0
-    bad = entry.assembly_of_step(line, model.sea.values, ends._replace(held=held), old, new, cv, ca, work)
+    bad = newton.assembly_of_step(line, model.sea.values, ends._replace(held=held), old, new, cv, ca, work)
     give, n = np.zeros((3, 3)), line.h.size
     x, load = np.zeros((n + 1, SIZE)), np.zeros((n + 1, SIZE))
     for axis in range(3):

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import WORK
 from hybrid.kernels.junctions.body_contact import EACH_BODY, TOUCHED, blank_meeting_job, meet_bodies
-from hybrid.kernels.junctions.borders import blank_border_job
+from hybrid.kernels.junctions.borders import blank_border_job, blank_network_job
 from hybrid.kernels.junctions.joined_lines import ANSWER, COLUMNS, FUNCTIONAL, TURNS
 from hybrid.kernels.junctions.junctions import HANDED, join_lines, twist_lines
 from hybrid.kernels.junctions.lines_contact import blank_touching_job, room_for_products, touch_network
-from hybrid.kernels.junctions.network_job import blank_network_job
 from hybrid.kernels.junctions.sheaves_and_winches import EACH_UNKNOWN, blank_unknowns_job, spin_sheaves, wind_lines
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats
@@ -51,7 +50,7 @@ BORDERS = {
 class Rooms(NamedTuple):
     """What jobs of lines work in, whichever they are of; only one of them works at a time."""
 
-    whole: Values  # of a kernels.junctions.network_job.NetworkJob
+    whole: Values  # of a kernels.junctions.borders.NetworkJob
     rows: Values  # likewise, with a row for each line of the network
     borders: dict[str, Callable[[Sequence[int]], Values | None]]  # of borders by name, for lines; None: they have none
 

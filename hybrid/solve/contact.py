@@ -31,8 +31,8 @@ from hybrid.kernels.contact.self_contact_law import (
 from hybrid.kernels.contact.self_contact_pairs import SHARES, SLIP_WITHIN, WINDOW, Contact, blank_contact
 from hybrid.kernels.junctions.lines_contact import MEETING, MET, MET_OTHER, MET_S, blank_shared_job, shared_task
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import block_rows, out_of_balance, workspace_of
+from hybrid.kernels.run import newton
+from hybrid.kernels.run.newton import block_rows, out_of_balance, workspace_of
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FORCE_A, NET_A, ROTARY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends, no_work
@@ -57,7 +57,7 @@ def left_over(
     state without contact.
     """
     rows = block_rows(line)
-    if entry.assembly(line, sea, ends, state, 0.0, anchor, work._replace(rows=rows)) >= 0:
+    if newton.assembly(line, sea, ends, state, 0.0, anchor, work._replace(rows=rows)) >= 0:
         return float("inf"), np.zeros((2, 3))
     left = out_of_balance(line, rows) + force
     left[[-k for k in (0, 1) if ends.held[k]]] = 0.0

@@ -8,8 +8,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, half_thickness
-from hybrid.kernels.laws.seabed import planes_under
-from hybrid.kernels.laws.soil import LATERAL
+from hybrid.kernels.laws.seabed import LATERAL, planes_under
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.report import (
     AXIS,

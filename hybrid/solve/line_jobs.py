@@ -13,12 +13,11 @@ from hybrid.kernels.algebra.block_elimination import KEPT, ROW
 from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.junctions.bodies import U
 from hybrid.kernels.junctions.body_contact import CARRY
+from hybrid.kernels.junctions.borders import APART, APART_ALWAYS, JOINED, NetworkTask, find_near, lead_lone
 from hybrid.kernels.junctions.joined_lines import SEAT
-from hybrid.kernels.junctions.network_job import APART, APART_ALWAYS, JOINED, NetworkTask, find_near, lead_lone
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.entry import NO_PUSH, in_plane, in_space
-from hybrid.kernels.run.newton import solve_network
+from hybrid.kernels.run.newton import NO_PUSH, in_plane, in_space, solve_network
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for

@@ -1,7 +1,7 @@
 """Lines that meet at points: their equilibrium, their consistent accelerations, and their steps in time.
 
 One Newton for all of them (kernels.run.newton), or where nothing joins or may join them one after the other, in space
-or in its plane (kernels.run.entry).  States go in and come out as of a single line (solve.stepper); a free
+or in its plane (kernels.run.newton).  States go in and come out as of a single line (solve.stepper); a free
 point has none of its own, it is the last or first node of every line that is joined to it.  A body has a row of numbers
 (kernels.junctions.bodies).
 """
@@ -19,11 +19,10 @@ from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.laws.obstacles import carry_obstacles
-from hybrid.kernels.laws.soil import lie_in_soil, rest_in_soil
+from hybrid.kernels.laws.seabed import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
-from hybrid.kernels.run.entry import ONE_MARCH, workspace_of
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_network_step
-from hybrid.kernels.run.newton import solve_network
+from hybrid.kernels.run.newton import ONE_MARCH, solve_network, workspace_of
 from hybrid.kernels.state.report import (
     FRICTION,
     LOCAL_ERROR,
@@ -39,7 +38,7 @@ from hybrid.kernels.state.report import (
 from hybrid.kernels.state.state import Floats, State, Work
 from hybrid.kernels.step.line_step import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, TOLERANCE, Limits, Task
 from hybrid.kernels.step.step import friction_axes
-from hybrid.kernels.step.step_law import REFUSED
+from hybrid.kernels.step.step_control import REFUSED
 from hybrid.solve.contact import SelfContact, SharedContact, left_over
 from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.line_jobs import LineJobs

@@ -32,8 +32,8 @@ from hybrid.kernels.run.network_run import (
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import REPORT_SIZE, SEEN
 from hybrid.kernels.state.state import NO_LAYERS_SEEN, NO_SOIL, NO_SOIL_SEEN, NOT_VARYING, Batch, Floats, Moves
-from hybrid.kernels.step.sampling import SAME_TIME
-from hybrid.kernels.step.step_law import FIRST, WARY
+from hybrid.kernels.step.accept import SAME_TIME
+from hybrid.kernels.step.step_control import FIRST, WARY
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import MOST_ITERATIONS, REACH, NetworkState, NetworkTaken
 

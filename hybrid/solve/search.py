@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
 from hybrid.kernels.laws.obstacles import half_thickness
-from hybrid.kernels.laws.seabed import planes_under
-from hybrid.kernels.laws.soil import PART, depth_under
+from hybrid.kernels.laws.seabed import PART, depth_under, planes_under
 from hybrid.kernels.state.report import (
     AXIAL_LAW,
     FLOW,

@@ -12,8 +12,8 @@ from hybrid.kernels.algebra.plane import WIDE
 from hybrid.kernels.algebra.sparse_rows import is_definite
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, wrong_pivots_at_rest
 from hybrid.kernels.mesh.zone_transfer import carry_push
-from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import block_rows, workspace
+from hybrid.kernels.run import newton
+from hybrid.kernels.run.newton import block_rows, workspace
 from hybrid.kernels.state.report import AXIAL_LAW, DRAG, MASS_DAMPING, PLANAR, ROTARY
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 
@@ -194,7 +194,7 @@ class Stability:
         """
         line = self.line
         rows = block_rows(line)
-        entry.assembly(line, self.sea, ends, state, 0.0, soft, workspace(line.h.size)._replace(rows=rows))
+        newton.assembly(line, self.sea, ends, state, 0.0, soft, workspace(line.h.size)._replace(rows=rows))
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
         plane = line.plane if line.bits & PLANAR else None

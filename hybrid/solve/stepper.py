@@ -22,11 +22,10 @@ from hybrid.kernels.junctions.bodies import STATE
 from hybrid.kernels.junctions.joined_lines import SEAT, TURNS
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_energy
-from hybrid.kernels.laws.seabed import normal_forces, planes_under
-from hybrid.kernels.laws.soil import soil_at_rest
+from hybrid.kernels.laws.seabed import normal_forces, planes_under, soil_at_rest
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.run import entry
-from hybrid.kernels.run.entry import block_rows, out_of_balance, workspace_of
+from hybrid.kernels.run import newton
+from hybrid.kernels.run.newton import block_rows, out_of_balance, workspace_of
 from hybrid.kernels.state.report import FRICTION, SEABED_ENERGY, SOIL, WAVES
 from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step.step import friction_axes
@@ -87,7 +86,7 @@ def hold_by_friction(line: Line, sea: Sea, ends: Ends, state: State) -> None:
     smooth = line._replace(bits=line.bits & ~(FRICTION | WAVES))
     rows = block_rows(smooth)
     at_rest = state._replace(vd=still, T=state.T if line.law.size else tension)
-    entry.assembly(smooth, sea, ends, at_rest, 0.0, HEAVY, workspace_of(line)._replace(rows=rows))
+    newton.assembly(smooth, sea, ends, at_rest, 0.0, HEAVY, workspace_of(line)._replace(rows=rows))
     force = out_of_balance(smooth, rows)
     force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
     friction_axes(sea, state.r, state.e, state.slip, state.grip)
@@ -137,7 +136,7 @@ class NetworkTaken:
     where: int  # its cell or node
     residual: float  # N, largest residual force at a node or point
     error: float = 0.0  # m, local error of a step
-    ratio: float = 0.0  # largest over what is allowed of a line; above REFUSED (step.step_law) it is in no books
+    ratio: float = 0.0  # largest over what is allowed of a line; above REFUSED (step.step_control) it is in no books
     rho: float = 0.0  # spectral radius at infinity of the step
 
 

@@ -37,7 +37,7 @@ print(places[1, 0])
 
 SCENE = """
 import hybrid
-from hybrid.kernels.run.entry import in_space
+from hybrid.kernels.run.newton import in_space
 section = {"length": 1.0, "mass": 2.0, "bending_stiffness": 300.0, "torsional_stiffness": 1.0}
 scene = hybrid.validate_scene({
     "cable": {"sections": [section]},
@@ -196,11 +196,12 @@ def test_an_edit_means_new_code_of_the_kernels_that_it_reaches_and_of_no_others(
     assert not changed("kernels/run/network_run.py", '"""Steps of all lines until', '"""Steps of lines until')
     constant = changed("kernels/state/books.py", "FAILED = range(6)", "FAILED = range(50, 56)")
     assert (
-        "hybrid.kernels.run.network_run.run_network" in constant and "hybrid.kernels.run.entry.in_plane" not in constant
+        "hybrid.kernels.run.network_run.run_network" in constant
+        and "hybrid.kernels.run.newton.in_plane" not in constant
     )
     field = "    itself: int = 0  # address of"
     moved = changed("kernels/step/line_step.py", field, "    another: int = 0\n" + field)
-    assert "hybrid.kernels.run.entry.in_plane" in moved and len(moved) < len(before)
+    assert "hybrid.kernels.run.newton.in_plane" in moved and len(moved) < len(before)
 
 
 @pytest.mark.long
@@ -306,6 +307,6 @@ def test_laws_that_a_scene_does_not_have_are_not_compiled(monkeypatch: pytest.Mo
     }  # fmt: skip
     hybrid.run(scene, progress=False).close()
     names = {x.removeprefix("hybrid.kernels.") for x in linked if ".laws." in x}
-    assert {"laws.obstacles.passes", "laws.soil.update_soil"} < names
+    assert {"laws.obstacles.passes", "laws.seabed.update_soil"} < names
     assert "run.network.begin_line" in asked
     assert not asked & names

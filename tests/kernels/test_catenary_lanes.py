@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.algebra.block_elimination import ROW, SPAN
-from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
+from hybrid.kernels.run.newton import assembly, block_rows, correction, workspace
 from hybrid.kernels.state.report import (
     ADDED_MASS,
     ADDED_MASS_POWER,

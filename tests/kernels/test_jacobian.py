@@ -13,7 +13,7 @@ import pytest
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.march import update
-from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
+from hybrid.kernels.run.newton import assembly, block_rows, correction, workspace
 from hybrid.kernels.state.report import (
     ADDED_MASS,
     BEGAN,

@@ -12,7 +12,7 @@ from hybrid.kernels.algebra.kept_factors import SWEEP, carry_given, prepare_swee
 from hybrid.kernels.algebra.plane import TRIPLE
 from hybrid.kernels.algebra.sparse_rows import add_rows, is_definite
 from hybrid.kernels.machine.compile import kernel
-from hybrid.kernels.run.entry import assembly, workspace
+from hybrid.kernels.run.newton import assembly, workspace
 from hybrid.model.mesh import Zone
 from hybrid.outputs.observed_states import Grid
 

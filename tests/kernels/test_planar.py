@@ -13,7 +13,7 @@ from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, assembled, in_soil, 
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.plane import KEPT, TRIPLE, solve_again_planar
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
-from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
+from hybrid.kernels.run.newton import assembly, block_rows, correction, workspace
 from hybrid.kernels.state import report
 from hybrid.kernels.state.report import PLANAR, RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state.state import State

@@ -8,7 +8,7 @@ import pytest
 from hybrid.kernels.contact import self_contact as k
 from hybrid.kernels.contact.self_contact_law import INNER, OUTER, add_gradient, add_product
 from hybrid.kernels.machine.compile import kernel
-from hybrid.kernels.run.entry import workspace
+from hybrid.kernels.run.newton import workspace
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import blank_line, blank_state, no_ends
 from hybrid.kernels.step.line_step import ASKED, LIMIT, PREPARE, REST

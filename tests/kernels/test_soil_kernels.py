@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybrid.kernels.laws import soil
+from hybrid.kernels.laws import seabed
 from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import no_sea
 
 
 def plain() -> SimpleNamespace:
     """The laws as Python, which kernels take in where they are called."""
-    names: dict[str, Any] = dict(vars(soil))
-    for name, x in vars(soil).items():
+    names: dict[str, Any] = dict(vars(seabed))
+    for name, x in vars(seabed).items():
         if hasattr(x, "py_func"):
             names[name] = FunctionType(x.py_func.__code__, names)
     return SimpleNamespace(**names)
@@ -146,7 +146,7 @@ def test_a_state_that_is_looked_at_again_remembers_the_same(way: list[float]) ->
 
 @pytest.mark.parametrize("P", [1.0, 50.0, 900.0, 6000.0])
 def test_the_depth_under_a_pressure_is_the_inverse_of_first_penetration(P: float) -> None:
-    z = soil.depth_under(CLAY, D, P)
+    z = seabed.depth_under(CLAY, D, P)
     assert law.first_penetration(CLAY, D, z)[0] == pytest.approx(P, rel=1e-12)
 
 

@@ -10,7 +10,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.march import update
-from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
+from hybrid.kernels.run.newton import assembly, block_rows, correction, workspace_of
 from hybrid.kernels.state.report import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING, STRETCH_ENERGY
 from hybrid.kernels.state.state import NO_LAW, blank_state
 

@@ -7,7 +7,7 @@ from kernels.test_jacobian import CA, CV, N, random_case
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.march.march import update
 from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, pass_torque
-from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace, workspace_of
+from hybrid.kernels.run.newton import assembly, block_rows, correction, workspace, workspace_of
 from hybrid.kernels.state.report import MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
 
 # Elements at nodes 0 to N, and the zones that follow.

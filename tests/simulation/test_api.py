@@ -15,7 +15,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.machine.kept_code import KeptCode
-from hybrid.kernels.reel import node_changes, payout, payout_nodes
+from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.scene.read import as_scene
 from hybrid.simulation import first_use
 from hybrid.simulation.progress import Progress
@@ -213,10 +213,10 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
     """All entries that take a table, of which none is forgotten, but for what joined lines and a release ask for."""
     others = {"end_payout", "iterate_with_others"}
-    entry = type(node_changes.plan_node)
+    entry = type(payout_nodes.plan_node)
     used = {
         x.__qualname__
-        for module in (payout, payout_nodes, node_changes)
+        for module in (payout, payout_nodes)
         for x in vars(module).values()
         if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
     }
@@ -294,7 +294,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     hybrid.static(scene) if static else hybrid.run(scene)
     texts = [x for value in vars(first_use).values() for x in (value if isinstance(value, tuple) else (value,))]
     large = {x for x in texts if isinstance(x, str) and x.count(".") == 2}
-    assert {"run.entry.in_space", "run.network.begin_line"} < large
+    assert {"run.newton.in_space", "run.network.begin_line"} < large
     before = {first_use.ZONES: first_use.CRITERIA, first_use.STEPS_OF_LINES: first_use.REST_OF_LINES}
     stood_for = {before[name] for name in known if name in before}  # compiled before those, by the same calls
     if "zones" in kind:
@@ -305,7 +305,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
 @pytest.mark.long
 def test_an_equilibrium_in_a_plane_asks_for_no_solver_in_space() -> None:
     """Whose compilation takes longest; in a process of its own, where nothing is compiled or loaded yet."""
-    code = "import hybrid, json, sys; from hybrid.kernels.run import entry; hybrid.static(json.loads(sys.argv[1])); "
+    code = "import hybrid, json, sys; from hybrid.kernels.run import newton; hybrid.static(json.loads(sys.argv[1])); "
     code += "print(len(entry.in_plane.signatures), len(entry.in_space.signatures))"
     done = subprocess.run(
         [sys.executable, "-c", code, json.dumps(KINDS["rod in a plane"])], capture_output=True, text=True, check=True
@@ -323,4 +323,4 @@ def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
     monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
     hybrid.run(KINDS[kind])
     assert not called & {"run.newton.solve_network", "junctions.junctions.join_lines"}
-    assert ("run.entry.in_space" in called) == kind.startswith("rod in space")
+    assert ("run.newton.in_space" in called) == kind.startswith("rod in space")

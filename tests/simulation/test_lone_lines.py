@@ -13,7 +13,7 @@ from test_system_contact import CLOSER, HOSE, LOW, RUBS
 from test_winch import floating
 
 import hybrid
-from hybrid.kernels.junctions.network_job import JOINED
+from hybrid.kernels.junctions.borders import JOINED
 from hybrid.kernels.state.report import PLANAR
 from hybrid.scene.root import in_full
 from hybrid.solve.network_solver import NetworkSolver

@@ -11,7 +11,7 @@ from bits import resumed
 from test_payout import G, clamped, hanging, sagging
 
 import hybrid
-from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B, PHASE
+from hybrid.kernels.laws.water import LIFT_A, LIFT_B, PHASE
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
 from hybrid.simulation.payout import PayingOut

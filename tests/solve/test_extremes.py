@@ -16,7 +16,7 @@ from scipy.linalg import solve_banded
 
 import hybrid
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
-from hybrid.kernels.run.entry import block_rows, correction, workspace_of
+from hybrid.kernels.run.newton import block_rows, correction, workspace_of
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from tests.scenes import cable_scene, pinned_at

@@ -11,8 +11,20 @@ from hybrid.errors import Outcome
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import no_moves
-from hybrid.kernels.step.step_control import before_fixed, end_of_try, halve, note_past, passes, radius_of_step, weights
-from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
+from hybrid.kernels.step.step_control import (
+    FIRST,
+    LEAST,
+    MOST,
+    REFUSED,
+    before_fixed,
+    end_of_try,
+    halve,
+    note_past,
+    passes,
+    radius_of_step,
+    step_end,
+    weights,
+)
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from tests.scenes import cable_scene, pinned_at
@@ -191,7 +203,7 @@ class Controller:
         return self.clock.next_dt
 
     def until(self, t, stop):
-        return step_end(t, stop, self.next)
+        return step_end.py_func(t, stop, self.next)
 
     def accepts(self, dt, error):
         return _passes(self.clock, self.count, dt, error)

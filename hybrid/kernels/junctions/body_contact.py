@@ -42,10 +42,10 @@ from hybrid.kernels.junctions.borders import (
     keep_corrections,
     push_node,
     put_corrections,
+    read_network,
 )
 from hybrid.kernels.junctions.joined_lines import factor_dense, substitute_dense
 from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
-from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, put_vector, row3, transposed
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader

@@ -46,6 +46,7 @@ from hybrid.kernels.junctions.borders import (
     TURNED,
     UPDATE,
     read_border,
+    read_network,
 )
 from hybrid.kernels.junctions.joined_lines import (
     COLUMNS,
@@ -72,7 +73,6 @@ from hybrid.kernels.junctions.joined_lines import (
     substitute_dense,
     turns,
 )
-from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness

@@ -8,7 +8,7 @@ Half of the energy of a point of contact between two lines is of each.  The work
 that of the mean of their forces before and after a step on its way, with the change of its half: over all lines it is
 that of friction.
 
-In a correction of Newton's method it is solved as in kernels.contact.self_contact_solve, with the matrix A of all
+In a correction of Newton's method it is solved as in kernels.contact.self_contact, with the matrix A of all
 lines, points and bodies in place of that of one line: a product with A^-1 carries a right-hand side on the nodes in
 contact through the kept factors of the lines, the junctions and back.
 """
@@ -24,7 +24,23 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, sweep
 from hybrid.kernels.algebra.rotations import get3
-from hybrid.kernels.contact.self_contact import contact_task, energy_without_weight, is_gain, is_judged, work_of_try
+from hybrid.kernels.contact.self_contact import (
+    begin_columns,
+    combine_vectors,
+    contact_task,
+    energy_without_weight,
+    enough,
+    find_forces,
+    inner_product,
+    is_gain,
+    is_judged,
+    length_of,
+    load_vector,
+    rotate_column,
+    solve_columns,
+    unknowns,
+    work_of_try,
+)
 from hybrid.kernels.contact.self_contact import read as read_contact
 from hybrid.kernels.contact.self_contact_law import FOOT_PLACE, PLACE, P, Q, add_gradient, add_held, arc_length
 from hybrid.kernels.contact.self_contact_pairs import (
@@ -35,18 +51,6 @@ from hybrid.kernels.contact.self_contact_pairs import (
     SHARES,
     SLIP_WITHIN,
     WITHIN_LINE,
-)
-from hybrid.kernels.contact.self_contact_solve import (
-    begin_columns,
-    combine_vectors,
-    enough,
-    find_forces,
-    inner_product,
-    length_of,
-    load_vector,
-    rotate_column,
-    solve_columns,
-    unknowns,
 )
 from hybrid.kernels.junctions.borders import (
     COUPLE,
@@ -61,9 +65,10 @@ from hybrid.kernels.junctions.borders import (
     hand_on,
     keep_corrections,
     push_node,
+    read_network,
+    task_of,
 )
 from hybrid.kernels.junctions.junctions import move_joints
-from hybrid.kernels.junctions.network_job import read_network, task_of
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
@@ -98,7 +103,7 @@ class SharedJob(NamedTuple):
     lines: NDArray[np.int64]  # (K,) numbers of those that may touch
     begins: NDArray[np.int64]  # (K,) where their nodes begin
     starts: Floats  # (K,) m, their arc lengths as parts of the one line, less their own
-    joints: NumberRows  # (L, 2) as kernels.junctions.network_job.NetworkJob has it
+    joints: NumberRows  # (L, 2) as kernels.junctions.borders.NetworkJob has it
     inner: NDArray[np.int64]  # table of a ContactJob of them as one line
     pushes: Blocks  # (2, N+1, 4) N, N m, forces of other lines on nodes, moments on cells
     shares: Blocks  # (2, K, SHARES) of Contact, likewise

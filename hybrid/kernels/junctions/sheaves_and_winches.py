@@ -4,11 +4,11 @@ z is how all corrections x answer to such an unknown y, with those before it, an
 its own equation leaves over, d how that answers to y with all else still, and q x how it answers to corrections.  Then
 y = -(g + q x) / (d + q z), and where x is as it is, whatever else has been added to it, y = -(g + q x) / d.
 
-Sheaves that turn freely under several lines (kernels.laws.sheaves has the symbols): one angle of each for all of them.
+Sheaves that turn freely under several lines (kernels.laws.obstacle_grip has the symbols): one angle of each for all of them.
 Every line has the sheave among its obstacles, with its angle in its state, where all are the same.  M is the sum over the
 lines, and p stands on the nodes of all.
 
-Winches that hold a tension, of lines with an end on a point or body that moves (kernels.reel.winch has the symbols): their
+Winches that hold a tension, of lines with an end on a point or body that moves (kernels.reel.reel has the symbols): their
 lengths.  The rotor is out of balance by  g = I dc/dt + B(c) + T - P,  which falls with the tension before the fairlead.
 """
 
@@ -32,10 +32,10 @@ from hybrid.kernels.junctions.borders import (
     keep_corrections,
     push_node,
     put_corrections,
+    read_network,
 )
-from hybrid.kernels.junctions.network_job import read_network
+from hybrid.kernels.laws.obstacle_grip import along, moments, roll_sheave
 from hybrid.kernels.laws.obstacles import carry_obstacles
-from hybrid.kernels.laws.sheaves import along, moments, roll_sheave
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.reel.reel import MOVES, WAITS

@@ -26,8 +26,7 @@ from typing import NamedTuple
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.element import Rates
 from hybrid.kernels.laws.node_forces import Z3, Water, body_water
-from hybrid.kernels.laws.seabed import bed_under, contact, pressure
-from hybrid.kernels.laws.soil import borne_length
+from hybrid.kernels.laws.seabed import bed_under, borne_length, contact, pressure
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import BODIES, CONTACT_FORCE, FLOW, FORCE_A, NET_A, SEABED, SOIL, SURFACE, WAVES

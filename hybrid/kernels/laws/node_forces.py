@@ -25,14 +25,23 @@ from hybrid.kernels.algebra.plane import (
 )
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.laws.obstacles import obstacle_forces
-from hybrid.kernels.laws.seabed import bed_before, bed_beside, bed_under, contact, depth_falls, friction, pressure
-from hybrid.kernels.laws.soil import left_of, soil_force
-from hybrid.kernels.laws.vortices import lift_at
+from hybrid.kernels.laws.seabed import (
+    bed_before,
+    bed_beside,
+    bed_under,
+    contact,
+    depth_falls,
+    friction,
+    left_of,
+    pressure,
+    soil_force,
+)
 from hybrid.kernels.laws.water import (
     body_drag,
     current_at,
     half_cell_added_mass,
     half_cell_drag,
+    lift_at,
     wetted,
     wetted_stretch,
 )

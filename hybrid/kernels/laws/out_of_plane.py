@@ -33,8 +33,7 @@ from hybrid.kernels.algebra.plane import (
 )
 from hybrid.kernels.algebra.rotations import get3, jacobian_functions
 from hybrid.kernels.laws.bending_law import moment_share, slip_about_normal
-from hybrid.kernels.laws.seabed import bed_under
-from hybrid.kernels.laws.soil import left_of, soil_force
+from hybrid.kernels.laws.seabed import bed_under, left_of, soil_force
 from hybrid.kernels.laws.water import body_drag, current_at, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.report import (

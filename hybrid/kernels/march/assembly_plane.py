@@ -280,7 +280,7 @@ def march_planar(line, sea, ends, r, state, cv, ca, work):
     """As kernels.march.assembly.march for a cable in the plane `line.plane`.
 
     work.rows with N+1 entries receives every block row before elimination, three rows of WIDE.  Factors are kept behind
-    the X_i where X has room for those of space (kernels.run.entry.workspace).
+    the X_i where X has room for those of space (kernels.run.newton.workspace).
     """
     n, plane = line.h.shape[0], line.plane
     X, report, rows, rates = work.X, work.report, work.rows, Rates(cv, ca)

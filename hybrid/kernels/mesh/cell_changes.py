@@ -20,7 +20,7 @@ from hybrid.kernels.laws.axial_law import stretch_energy
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
 from hybrid.kernels.laws.obstacles import stored_in_contact
-from hybrid.kernels.laws.soil import lie_in_soil
+from hybrid.kernels.laws.seabed import lie_in_soil
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
@@ -221,7 +221,7 @@ def clear(x):
 def begin_anew(job, state, s, line):
     """What a change of cells or of nodes leaves of the run beside the line: nothing is known of the step before.
 
-    job: a RenewJob, or the NodeJob of kernels.reel.node_changes; state, line: new; s: old nodes.
+    job: a RenewJob, or the NodeJob of kernels.reel.payout_nodes; state, line: new; s: old nodes.
     """
     copy_state(state, job.twin)
     if job.push.shape[0] > 0:

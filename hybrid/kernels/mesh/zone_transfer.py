@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, spin_about, sub, transport
 from hybrid.kernels.laws.element import chord, turns_freely
-from hybrid.kernels.laws.soil import remember_between
+from hybrid.kernels.laws.seabed import remember_between
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
-from hybrid.kernels.laws.vortices import PHASE
+from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import ROTARY

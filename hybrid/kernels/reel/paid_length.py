@@ -70,7 +70,7 @@ from hybrid.kernels.laws.element import (
 )
 from hybrid.kernels.laws.node_forces import Z9, node_loads
 from hybrid.kernels.laws.tension_torque import couples
-from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B
+from hybrid.kernels.laws.water import LIFT_A, LIFT_B
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.mesh.remesh import B_1, COLUMNS, fill_cell, fill_element, fill_node
 from hybrid.kernels.reel.reel import LENGTH_OF, STRAIN_OF

@@ -24,7 +24,6 @@ from hybrid.kernels.laws.element import Chord, Rates, chord
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.reel.damping import correct_damping_power, correct_end, power_of_flow, put_flow_on
 from hybrid.kernels.reel.paid_length import (
     cell,
     eased,
@@ -46,15 +45,21 @@ from hybrid.kernels.reel.paid_length import (
 from hybrid.kernels.reel.payout_work import (
     book,
     book_contact,
+    correct_damping_power,
+    correct_end,
     end_of,
     leave_to_reel,
     let_material_rub,
+    power_of_flow,
+    put_flow_on,
     remember,
     rubs,
     work_of_balance,
 )
-from hybrid.kernels.reel.reel import FEWEST_STEPS, MOVES, WAITS, read
-from hybrid.kernels.reel.winch import (
+from hybrid.kernels.reel.reel import (
+    FEWEST_STEPS,
+    MOVES,
+    WAITS,
     accept,
     answer_of_cell,
     at_its_end,
@@ -63,6 +68,7 @@ from hybrid.kernels.reel.winch import (
     lengthen_cell,
     losses,
     predict,
+    read,
     softness,
     tension_held,
 )

@@ -1,6 +1,6 @@
 """Steps of lines that meet at points: what Newton's method asks of all of them, their books, and samples within steps.
 
-They are solved in space (kernels.run.newton).  Samples are rows of the lines and bodies at times within a step (kernels.step.sampling).  Ends of lines are where their nodes are, as points are, which have no samples of their own.  Bodies move by the cubic of
+They are solved in space (kernels.run.newton).  Samples are rows of the lines and bodies at times within a step (kernels.step.accept).  Ends of lines are where their nodes are, as points are, which have no samples of their own.  Bodies move by the cubic of
 their velocities at both ends of the step, and turn by that of their spins; what lines do to them lies on the parabola
 through the step before as well, as reactions do.
 """
@@ -35,9 +35,9 @@ from hybrid.kernels.junctions.borders import (
     SPECTRAL_RADIUS,
     START,
     ask,
+    read_network,
 )
 from hybrid.kernels.junctions.junctions import move_joints
-from hybrid.kernels.junctions.network_job import read_network
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import put_matrix as put_matrix_of
@@ -62,7 +62,18 @@ from hybrid.kernels.state.report import (
     TOUCHES,
 )
 from hybrid.kernels.state.report import TURNED as TURNED_AXES
-from hybrid.kernels.step.accept import book_torques, impose_now, keep_past, watch
+from hybrid.kernels.step.accept import (
+    SAME_TIME,
+    book_torques,
+    frame_between,
+    hermite,
+    impose_now,
+    keep_past,
+    parabola,
+    sample_head,
+    sample_state,
+    watch,
+)
 from hybrid.kernels.step.line_step import (
     ASSEMBLY,
     GAIN,
@@ -87,7 +98,6 @@ from hybrid.kernels.step.line_step import (
     wind,
     with_radius,
 )
-from hybrid.kernels.step.sampling import SAME_TIME, frame_between, hermite, parabola, sample_head, sample_state
 from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, find_rates
 from hybrid.kernels.step.step_control import scheme
 from hybrid.kernels.watch.extremes import first_strains, note_extremes

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
 from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK, read_members
-from hybrid.kernels.junctions.network_job import is_grouped_otherwise, is_touched_alone, read_network
+from hybrid.kernels.junctions.borders import is_grouped_otherwise, is_touched_alone, read_network
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
@@ -119,7 +119,7 @@ class StepsJob(NamedTuple):
     reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
     solver: int = 0  # address of kernels.run.newton.solve_network
-    leader: int = 0  # of kernels.junctions.network_job.lead_lone; 0: no line can come near what is free
+    leader: int = 0  # of kernels.junctions.borders.lead_lone; 0: no line can come near what is free
     finder: int = 0  # and of find_near
     book: int = 0  # of book_network_step
     sampler: int = 0  # of sample_network

@@ -50,9 +50,8 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
     rotation,
 )
-from hybrid.kernels.junctions.borders import END, answer_right_sides, hand_on
+from hybrid.kernels.junctions.borders import END, answer_right_sides, hand_on, read_network, task_of
 from hybrid.kernels.junctions.borders import START as BEGIN
-from hybrid.kernels.junctions.network_job import read_network, task_of
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader

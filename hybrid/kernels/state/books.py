@@ -180,7 +180,7 @@ class Books(NamedTuple):
     log: Floats  # (rows, len(LOG))
     samples: Floats  # (rows, sample_size(N))
     # (N+1, STRAINS) of elements: curvature (1/m), bending moment (N m), torque (N m), curvature as results have it, and
-    # what kernels.watch.soft_rods finds that by; empty: not wanted
+    # what kernels.watch.sides finds that by; empty: not wanted
     strains: Floats
     start: Floats  # (N+1, 3) m, positions from which displacements count
     marks: NDArray[np.int8]  # (N+1,)

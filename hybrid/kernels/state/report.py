@@ -204,13 +204,13 @@ OBSTACLES = 65536
 TOUCHES = SEABED | OBSTACLES
 # No force: moment that is no multiple of curvature (hybrid.kernels.laws.bending_law).
 BENDING_LAW = 131072
-# Lift of vortices that follow the motion (hybrid.kernels.laws.vortices).
+# Lift of vortices that follow the motion (hybrid.kernels.laws.water).
 VORTICES = 262144
 # No force: layers of a section that slip on each other as it bends (hybrid.kernels.laws.bending_law).
 BENDING_SLIP = 1048576
 # Nor is this: they stay as Line.slip_now has them, whatever the line does.
 HELD_SLIP = 16777216
-# Bed that remembers (hybrid.kernels.laws.soil): in place of the linear one; no force: friction that falls as a line slides.
+# Bed that remembers (hybrid.kernels.laws.seabed): in place of the linear one; no force: friction that falls as a line slides.
 SOIL = 2097152
 BREAKOUT = 4194304
 REMEMBERS = SOIL | BREAKOUT

@@ -99,7 +99,7 @@ NO_SLIP: Floats = np.zeros((0, 4))
 NO_SLIP_FLOW: Floats = np.zeros((0, 2))
 ROWS: Floats = np.zeros((1, 3))  # any, as an example
 NO_LAYERS: Floats = np.zeros((0, 0))
-# Of a line without vortices (kernels.laws.vortices has the columns).
+# Of a line without vortices (kernels.laws.water has the columns).
 NO_WAKE_LAW: Floats = np.zeros((0, 8))
 NO_WAKE: Floats = np.zeros((0, 4))
 NO_SLOW: Floats = np.zeros(0)
@@ -110,7 +110,7 @@ NO_CARRIED: Floats = np.zeros((0, CARRIED))
 NO_OBSTACLES_SEEN: Floats = np.zeros((0, 0, SEEN))
 NO_GRIP: Floats = np.zeros((0, 0))
 NO_LAYERS_SEEN: Floats = np.zeros((0, 0, 0))
-# Of a line on a bed that does not remember (kernels.laws.soil has the columns), and of outputs of one.
+# Of a line on a bed that does not remember (kernels.laws.seabed has the columns), and of outputs of one.
 NO_SOIL: Floats = np.zeros((0, 6))
 NO_SOIL_SEEN: Floats = np.zeros((0, 0, 0))
 NO_SHEAVES: Floats = np.zeros((0, 4))
@@ -176,7 +176,7 @@ class Line(NamedTuple):
     # (N+1, 7) of elements whose moment is no multiple of bend (kernels.laws.bending_law); empty: there are none
     bend_law: Annotated[Floats, node(columns=7, optional=True)] = NO_BEND_LAW
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
-    # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
+    # (N+1, 8) of nodes with vortices (kernels.laws.water); empty: there are none
     wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
     # (N+1, 4 L) of elements with up to L layers that slip (kernels.laws.bending_law), and how far they have, written before
     # every march; empty: there are none
@@ -185,7 +185,7 @@ class Line(NamedTuple):
     # (N+1, 2 L) 1/m, by how much State.layers is another in a step because material flows past nodes
     # (kernels.reel.paid_length); empty: the line is not paid out
     slip_flow: Annotated[Floats, node(columns=2, optional=True)] = NO_SLIP_FLOW
-    # (N+1,) m, diameter with which nodes lie in soil (kernels.laws.soil); empty: there is none
+    # (N+1,) m, diameter with which nodes lie in soil (kernels.laws.seabed); empty: there is none
     bed_width: Annotated[Floats, node(optional=True)] = NO_PEAK
     moved: NDArray[np.int8] = (
         NO_MOVED  # (M,) of all obstacles: 1 where one moves, 2 where one turns freely; empty: none does
@@ -285,10 +285,10 @@ class Sea(NamedTuple):
     courses: Moves  # how obstacles move, a row each; empty: none does
     carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacles); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
-    rolling: Floats  # (2 K, N+1, 5) -p and q of K sheaves that turn freely (kernels.laws.sheaves)
+    rolling: Floats  # (2 K, N+1, 5) -p and q of K sheaves that turn freely (kernels.laws.obstacle_grip)
     boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.report); empty: no obstacle has any
     facets: Floats = NO_FACETS  # (F, FACET) of surfaces of triangles, in axes of their obstacles
-    soil: Floats = NO_SLOW  # of a bed that remembers (kernels.laws.soil); empty: it does not
+    soil: Floats = NO_SLOW  # of a bed that remembers (kernels.laws.seabed); empty: it does not
 
 
 class State(NamedTuple):
@@ -310,13 +310,13 @@ class State(NamedTuple):
     # beyond half a turn (rad), torque (N m), power that the torque gains because the zone bends without it (W)
     turn: Floats = NO_TURN
     slow: Floats = NO_SLOW  # (N,) N, mean tension of lines with a `law`; else empty
-    wake: Floats = NO_WAKE  # (N+1, 4) of lines with a `wake_law` (kernels.laws.vortices); else empty
+    wake: Floats = NO_WAKE  # (N+1, 4) of lines with a `wake_law` (kernels.laws.water); else empty
     # (N+1, 6 M) of each obstacle, of lines with `moved` (kernels.laws.obstacle_grip); else empty
     grip: Floats = NO_GRIP
-    sheave: Floats = NO_SHEAVES  # (M, 4) of all obstacles where one turns freely (kernels.laws.sheaves); else empty
+    sheave: Floats = NO_SHEAVES  # (M, 4) of all obstacles where one turns freely (laws.obstacle_grip); else empty
     peak: Floats = NO_PEAK  # (N,) N, highest mean tension of lines with a section that remembers it; else empty
     layers: Floats = NO_LAYERS  # (N+1, 2 L) 1/m, how far layers have slipped, of lines with a `slip_law`; else empty
-    soil: Floats = NO_SOIL  # (N+1, 6) of lines on a bed that remembers (kernels.laws.soil); else empty
+    soil: Floats = NO_SOIL  # (N+1, 6) of lines on a bed that remembers (kernels.laws.seabed); else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -435,7 +435,7 @@ class Torsion(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Arrays that a solver works in; kernels.run.entry.workspace makes them."""
+    """Arrays that a solver works in; kernels.run.newton.workspace makes them."""
 
     u: Floats  # (N+1, 3) m, displacement of the nodes since the start of the step
     x: Floats  # (N+1, 5) Newton's correction: dT of the cell before (N), dr of the node (m), dpsi of the cell after (rad)

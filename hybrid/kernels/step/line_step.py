@@ -2,7 +2,7 @@
 
 `plane` and `space`: for which kind of line (kernels.march.march).
 
-`Job` has all that steps of a line need, by reference: it is the table of an entry of kernels.run.entry.
+`Job` has all that steps of a line need, by reference: it is the table of an entry of kernels.run.newton.
 
 What is beside the band of the line is a border.  Newton asks all of them a question in one place, by the function that is
 named here, and in this order; of a line that does not have it each costs a comparison.  Of joined lines it asks the same

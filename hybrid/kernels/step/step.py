@@ -9,14 +9,17 @@ from hybrid.kernels.algebra.block_elimination import ROW
 from hybrid.kernels.algebra.plane import KEPT, TRIPLE
 from hybrid.kernels.algebra.rotations import dot, get3, spin_about, sub
 from hybrid.kernels.laws.element import chord
-from hybrid.kernels.laws.obstacle_grip import book_obstacles, grip_obstacles, mean_force
+from hybrid.kernels.laws.obstacle_grip import (
+    book_obstacles,
+    find_rates_of_sheaves,
+    grip_obstacles,
+    mean_force,
+    predict_sheaves,
+)
 from hybrid.kernels.laws.obstacles import carry_obstacles, normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
-from hybrid.kernels.laws.seabed import bed_under
-from hybrid.kernels.laws.sheaves import find_rates_of_sheaves, predict_sheaves
-from hybrid.kernels.laws.soil import slide_on, update_soil
-from hybrid.kernels.laws.vortices import advance_wake
-from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.laws.seabed import bed_under, slide_on, update_soil
+from hybrid.kernels.laws.water import advance_wake, wave_kinematics
 from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.march.march import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space

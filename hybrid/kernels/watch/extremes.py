@@ -23,8 +23,7 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, scale
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
 from hybrid.kernels.laws.element import chord, turning
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
-from hybrid.kernels.laws.seabed import bed_under, pressure
-from hybrid.kernels.laws.soil import PRESSES
+from hybrid.kernels.laws.seabed import PRESSES, bed_under, pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
@@ -43,6 +42,8 @@ from hybrid.kernels.state.books import (
 from hybrid.kernels.state.report import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats, blank_state, in_sea, no_ends
 from hybrid.kernels.watch.sides import (
+    BENT,
+    Rods,
     beside,
     element_strain,
     end_tension,
@@ -50,9 +51,9 @@ from hybrid.kernels.watch.sides import (
     is_smooth,
     passed_torque,
     put_layers,
+    restore_stiffness,
     strain_on_side,
 )
-from hybrid.kernels.watch.soft_rods import BENT, Rods, restore_stiffness
 
 
 @kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation

@@ -63,15 +63,18 @@ from hybrid.kernels.watch.extremes import borne, node_pressure
 from hybrid.kernels.watch.named_quantities import touch_at
 from hybrid.kernels.watch.sides import (
     LAYER,
+    Rods,
+    bend_direction,
     direction_on_side,
     end_tension,
     is_hinge,
     more_twist,
+    of_chords,
     passed_torque,
     put_layers,
+    restore_stiffness,
     strain_on_side,
 )
-from hybrid.kernels.watch.soft_rods import Rods, bend_direction, of_chords, restore_stiffness
 
 # Points of a cell at which the bed presses, where its load on nodes is found.
 POINTS = 12

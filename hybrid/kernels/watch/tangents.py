@@ -40,8 +40,7 @@ from hybrid.kernels.march.march import carry_director, left_over_in_space
 from hybrid.kernels.state.books import Books, Clock, Counts
 from hybrid.kernels.state.report import ASSEMBLED, ROTARY, STIFFNESS_DAMPING, WAVES
 from hybrid.kernels.state.state import LANES, Ends, Floats, Line, Moves, NumberRows, Rows, Sea, State, Work, blanks
-from hybrid.kernels.step.accept import keep_past
-from hybrid.kernels.step.sampling import sample_step
+from hybrid.kernels.step.accept import keep_past, sample_step
 
 # Columns of slopes.
 VELOCITY = 0  # 5, of velocity, 1/s: xx, xy, yy, xz, yz
