@@ -59,7 +59,7 @@ from hybrid.scene.ends import FreePoint
 from hybrid.scene.network import Network
 from hybrid.scene.read import scene_text
 from hybrid.simulation.run import static_network
-from hybrid.solve.contact_statics import contact_stiffness
+from hybrid.solve.lines_at_rest import contact_stiffness
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState
 

@@ -70,8 +70,7 @@ from hybrid.simulation.watches import (
     note_loops,
     sheaves_of,
 )
-from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, passed_obstacles, rubs_on
-from hybrid.solve.stability import is_stable
+from hybrid.solve.stability import TOUCHING, behind_obstacles, is_stable, obstacles_left, passed_obstacles, rubs_on
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0

@@ -35,10 +35,10 @@ from hybrid.scene.network_checks import floating_groups
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import borne_strain
 from hybrid.simulation.run_start import at_rest_with_contact, letting_touch, named, with_contact
-from hybrid.solve.flaws import ON_BED, behind_obstacles, passed_obstacles, rubs_on
 from hybrid.solve.lines_at_rest import Group, LinesAtRest, lines_at_rest, settled_with_friction
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import PUSHED, Start
+from hybrid.solve.stability import ON_BED, behind_obstacles, passed_obstacles, rubs_on
 from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, joined_ends
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
@@ -535,7 +535,7 @@ def _with_friction(
 def _keep_turns(model: NetworkModel, t: float, found: LinesAtRest) -> LinesAtRest:
     """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it.
 
-    A motion with contact keeps them by itself, in the writhe of loops as well (solve.contact_statics).
+    A motion with contact keeps them by itself, in the writhe of loops as well (solve.lines_at_rest).
     """
     for k, (x, state) in enumerate(zip(model.models, found.state.lines, strict=True)):
         turns = bool(model.seats[k, :, TURNS].any())

@@ -32,7 +32,7 @@ from hybrid.model.initial_shape import dead_loads, end_laid_anywhere
 from hybrid.model.material import Material
 from hybrid.outputs.observation import Observation
 from hybrid.scene.schema import LineScene
-from hybrid.solve.flaws import lies_slack
+from hybrid.solve.stability import lies_slack
 
 
 class Sink(Protocol):

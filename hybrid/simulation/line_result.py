@@ -48,10 +48,10 @@ from hybrid.simulation.remesh import Around, HasPlane
 from hybrid.simulation.result_file import Envelope, marked_places, marks_on
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.solve.contact import SelfContact
-from hybrid.solve.flaws import slack_cell
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import batch_of_rows, no_extremes
+from hybrid.solve.stability import slack_cell
 from hybrid.solve.stepper import JoinedLine, LineFailed
 from hybrid.store.recorder import Rows
 from hybrid.store.stored_rows import ComparisonRecorder

@@ -29,8 +29,7 @@ from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.result_file import marks_of
 from hybrid.simulation.run_contact import refuse_within_itself
 from hybrid.simulation.run_start import contacts_of
-from hybrid.solve.contact_statics import touching_solver
-from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.lines_at_rest import LinesAtRest, touching_solver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
 

@@ -33,8 +33,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import EventLog, slack_remedy
 from hybrid.simulation.lines_contact import JUMP, crossed, diameters, jumps, least_bending, shared_of, watched_pairs
 from hybrid.solve.contact import SelfContact, SharedContact
-from hybrid.solve.contact_statics import settled_network, touching_solver
-from hybrid.solve.lines_at_rest import Group, LinesAtRest
+from hybrid.solve.lines_at_rest import Group, LinesAtRest, settled_network, touching_solver
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.search import Start, Tally, in_slower_currents, is_in_current
 from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, hold_by_friction, joined_ends

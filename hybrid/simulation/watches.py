@@ -22,8 +22,7 @@ from hybrid.kernels.state.state import Batch, Floats, Sea, ends_in, state_in
 from hybrid.model.build import Model
 from hybrid.outputs.observation import Output
 from hybrid.simulation.events import EventLog
-from hybrid.solve.flaws import TOUCHING
-from hybrid.solve.stability import is_stable
+from hybrid.solve.stability import TOUCHING, is_stable
 from hybrid.store.capacity import formation_ratio, formation_tension, pop_out
 
 # Change of writhe, turns, that is a loop: a small one has nearly 1.

@@ -40,9 +40,8 @@ from hybrid.kernels.step.line_step import ASSEMBLY, CORRECTION, EQUILIBRIUM, STE
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_control import REFUSED
 from hybrid.solve.contact import SelfContact, SharedContact, left_over
-from hybrid.solve.flaws import buckling_line, flaw_of_lines
 from hybrid.solve.line_jobs import LineJobs
-from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING, DAMPING, stop
+from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING, DAMPING, buckling_line, flaw_of_lines, stop
 from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, Solution, lie_on_bed
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 

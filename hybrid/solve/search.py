@@ -30,7 +30,6 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
-from hybrid.solve.flaws import at_rest, fold_text, lowest_tension, on_obstacles, slack_text
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import (
     CALM,
@@ -38,10 +37,15 @@ from hybrid.solve.stability import (
     RELAXING_STEPS,
     Stability,
     along,
+    at_rest,
     damped,
+    fold_text,
     growth_time,
     gyration,
+    lowest_tension,
     nudged,
+    on_obstacles,
+    slack_text,
     stop,
 )
 from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, NetworkTaken, Solution, hold_by_friction

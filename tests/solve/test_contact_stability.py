@@ -11,8 +11,7 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.network import build_network
 from hybrid.simulation.equilibrium import equilibrium_of
-from hybrid.solve.contact_statics import ContactStability, contact_stiffness
-from hybrid.solve.lines_at_rest import LinesAtRest
+from hybrid.solve.lines_at_rest import ContactStability, LinesAtRest, contact_stiffness
 from hybrid.solve.search import PUSHED
 from tests.scenes import line_between, network_scene
 from tests.validation.test_validation_lines_contact import crossing

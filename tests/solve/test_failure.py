@@ -18,9 +18,9 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import one_line, read_text, scene_text
 from hybrid.scene.root import in_full
 from hybrid.simulation.equilibrium import equilibrium_of, group_of
-from hybrid.solve.flaws import FOLDED, folds
 from hybrid.solve.lines_at_rest import lines_at_rest
 from hybrid.solve.network_solver import NO_BODIES
+from hybrid.solve.stability import FOLDED, folds
 from hybrid.solve.stepper import NetworkState
 from tests.said import ONE, both_ways, line_of, said
 from tests.scenes import cable_scene, clamped_at, pinned_at

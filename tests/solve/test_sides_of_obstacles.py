@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
-from hybrid.solve.flaws import behind_obstacles, obstacles_left
+from hybrid.solve.stability import behind_obstacles, obstacles_left
 from tests.validation.obstacle_scenes import over_pipe
 
 RADIUS, AT = 0.5, np.array([5.0, 0.0, -1.0])
