@@ -438,13 +438,20 @@ def subtract_node_rows(A, m, X, p, q, s):
 
 
 @kernel
-def substitute(X, x):
-    """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
+def substitute(X, x, joined, more):
+    """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite.
+
+    joined: the last block is known, in x[n]; more: what blocks have beside their right-hand side, by columns (.., T, 5) of
+    which the first block is in row `first`: columns low to high - 1 times q; None: nothing.
+    """
     n = x.shape[0] - 1
-    y = (0.0, 0.0, 0.0, 0.0, 0.0)
+    last, y = n, (0.0, 0.0, 0.0, 0.0, 0.0)
     z0, z1, z2 = 0.0, 0.0, 0.0
     total = 0.0
-    for i in range(n, -1, -1):
+    if joined:
+        y, last = (x[n, 0], x[n, 1], x[n, 2], x[n, 3], 0.0), n - 1
+        x[n, 4] = 0.0
+    for i in range(last, -1, -1):
         p = i * ROW
         for k in range(SIZE):
             q = p + SPAN * k
@@ -453,6 +460,10 @@ def substitute(X, x):
                 - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
                 - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
             )  # fmt: skip
+            if more is not None:
+                columns, first, low, high, q = more
+                for b in range(low, high):
+                    x[i, k] += columns[b, first + i, k] * q[b]
             total += abs(x[i, k])
         z0, z1, z2 = y[1], y[2], y[3]
         y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])

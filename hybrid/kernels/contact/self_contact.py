@@ -600,9 +600,19 @@ def press(line, contact, touch, row):
 
 
 @inner
-def load_ends(line, ends, contact, report):
-    """Add the force of contact on the end nodes that are held to what the report says these bear."""
-    y, n = contact.y, line.h.shape[0]
+def load_ends(ends, y, first, n, report):
+    """Add forces y on the end nodes that are held, `first` and n behind it, to what the report says these bear."""
+    for k in range(2):
+        if ends.held[k] != 0:
+            for j in range(3):
+                report[FORCE_A + 3 * k + j] -= y[first + k * n, j]
+                report[NET_A + 3 * k + j] -= y[first + k * n, j]
+
+
+@inner
+def push_ends(contact, n):
+    """Forces of contact on the end nodes, 0 and n, into contact.y."""
+    y = contact.y
     for k in range(2):
         for j in range(3):
             y[k * n, j] = 0.0
@@ -613,11 +623,6 @@ def load_ends(line, ends, contact, report):
             add_gradient(point, y)
             if contact.numbers.friction > 0.0:
                 add_held(contact, i, y)
-    for k in range(2):
-        if ends.held[k] != 0:
-            for j in range(3):
-                report[FORCE_A + 3 * k + j] -= y[k * n, j]
-                report[NET_A + 3 * k + j] -= y[k * n, j]
 
 
 @kernel
@@ -679,7 +684,8 @@ def contact_task(table):
         foresee_nearness(line, ends, contact, new.v if phase == FINISH else old.v)
     if phase == FINISH:
         numbers.quiet += 1.0
-        load_ends(line, ends, contact, work.report)
+        push_ends(contact, line.h.shape[0])
+        load_ends(ends, contact.y, 0, line.h.shape[0], work.report)
     if phase in (FINISH, REST):
         press(line, contact, job.touch, 2 if phase == FINISH else 0)
     if phase == FIND:

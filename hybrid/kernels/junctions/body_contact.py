@@ -35,7 +35,6 @@ from hybrid.kernels.junctions.borders import (
     COUPLE,
     FORCE,
     HOLD,
-    add_corrections,
     answer_right_sides,
     clear_right_side,
     eliminate_right_side,
@@ -338,7 +337,7 @@ def apply(network, job):
     substitute_dense(job.coupling, last)
     for r in range(last):
         if touches(job, r):
-            add_corrections(network, -job.coupling[r, last], job.responses[r], job.turned[r])
+            put_corrections(network, 1.0, -job.coupling[r, last], job.responses[r], job.turned[r])
 
 
 @inner
@@ -360,7 +359,7 @@ def couple(network, job):
         select(network, job, r)
     if not factor_dense(job.coupling, last):
         return 0.0
-    put_corrections(network, job.kept, job.moved)
+    put_corrections(network, 0.0, 1.0, job.kept, job.moved)
     apply(network, job)
     return 1.0
 

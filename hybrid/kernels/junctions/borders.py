@@ -236,21 +236,22 @@ def is_grouped_otherwise(network):
 
 START, END = 0, 1
 # Questions, and what a border does then; it answers 1 where nothing else is said.
-PREDICT = 0  # a step begins; answered by the part of its prediction that is safe
-SPECTRAL_RADIUS = 1  # answered by the spectral radius that the step may have
-FORGET = 2  # a solution begins: what was known of another one is found anew
-BEFORE_MARCH = 3  # what it carries goes to where its unknowns are
-FORCE = 4  # after the march: what lines and it do to points and bodies in this state
-BALANCE = 5  # what its own equations leave over, when all of that is known
-BLOCK = 6  # columns, functional and block that fall on points and bodies, into A
-HOLD = 7  # springs against what nothing else holds, in the first iteration of an equilibrium
-COUPLE = 8  # its part of the corrections of the iteration; 0: singular, or as below
-AGAIN = 9  # its part of other corrections of the iteration, which have no residual; 0: not finite
-MEASURE = 10  # the largest shift and turn of its unknowns, into `moves`
-SAFE_PART = 11  # answered by the part of the corrections that is safe
-UPDATE = 12  # its unknowns move by the part of the corrections that is made
-RELAX = 13  # springs of HOLD follow the turns
-CARRY = 14  # a solution has ended: what it carries goes to where that has led
+# A step begins; answered by the part of its prediction that is safe.  `asked.rho_of_step` falls to the spectral radius that it
+# may have.
+PREDICT = 0
+FORGET = 1  # a solution begins: what was known of another one is found anew
+BEFORE_MARCH = 2  # what it carries goes to where its unknowns are
+FORCE = 3  # after the march: what lines and it do to points and bodies in this state
+BALANCE = 4  # what its own equations leave over, when all of that is known
+BLOCK = 5  # columns, functional and block that fall on points and bodies, into A
+HOLD = 6  # springs against what nothing else holds, in the first iteration of an equilibrium
+COUPLE = 7  # its part of the corrections of the iteration; 0: singular, or as below
+AGAIN = 8  # its part of other corrections of the iteration, which have no residual; 0: not finite
+MEASURE = 9  # the largest shift and turn of its unknowns, into `moves`
+SAFE_PART = 10  # answered by the part of the corrections that is safe
+UPDATE = 11  # its unknowns move by the part of the corrections that is made
+RELAX = 12  # springs of HOLD follow the turns
+CARRY = 13  # a solution has ended: what it carries goes to where that has led
 # Answers to COUPLE.
 NO_NUMBERS = -1.0  # corrections are not finite
 NO_SOLUTION = -2.0  # none were found in the iterations that there are
@@ -378,26 +379,13 @@ def keep_corrections(network, kept, moved):
 
 
 @inner
-def put_corrections(network, kept, moved):
-    """The same back."""
+def put_corrections(network, own, part, kept, moved):
+    """Corrections of lines and bodies become a part `own` of what they are and a part of what is kept."""
     for l in range(network.tables.shape[0]):
         x, o = read(network.tables[l]).work.x, network.begins[l]
         for i in range(x.shape[0]):
             for j in range(SIZE):
-                x[i, j] = kept[o + i, j]
+                x[i, j] = own * x[i, j] + part * kept[o + i, j]
     for b in range(network.work.shape[0]):
         for j in range(6):
-            network.work[b, X + j] = moved[b, j]
-
-
-@inner
-def add_corrections(network, part, kept, moved):
-    """A part of kept corrections to those of lines and bodies."""
-    for l in range(network.tables.shape[0]):
-        x, o = read(network.tables[l]).work.x, network.begins[l]
-        for i in range(x.shape[0]):
-            for j in range(SIZE):
-                x[i, j] += part * kept[o + i, j]
-    for b in range(network.work.shape[0]):
-        for j in range(6):
-            network.work[b, X + j] += part * moved[b, j]
+            network.work[b, X + j] = own * network.work[b, X + j] + part * moved[b, j]

@@ -310,37 +310,6 @@ def count_right(X, parts, first, begin, end, left):
 
 
 @inner
-def solve_back(X, columns, first, low, high, q, carries, place, x, joined):
-    """As `substitute`, for a line whose last block is known, in x[n] (joined), and its columns low to high - 1 by q.
-
-    carries: whether the start is joined; place: its correction, which is its shift and what it had still to go.
-    """
-    n = x.shape[0] - 1
-    y, z0, z1, z2 = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
-    total, last = 0.0, n
-    if joined:
-        y, last = (x[n, 0], x[n, 1], x[n, 2], x[n, 3], 0.0), n - 1
-        x[n, 4] = 0.0
-    for i in range(last, -1, -1):
-        p = i * ROW
-        for k in range(SIZE):
-            m = p + SPAN * k
-            x[i, k] = (
-                X[m + 8]
-                - X[m] * y[0] - X[m + 1] * y[1] - X[m + 2] * y[2] - X[m + 3] * y[3] - X[m + 4] * y[4]
-                - X[m + 5] * z0 - X[m + 6] * z1 - X[m + 7] * z2
-            )  # fmt: skip
-            for b in range(low, high):
-                x[i, k] += columns[b, first + i, k] * q[b]
-            total += abs(x[i, k])
-        z0, z1, z2 = y[1], y[2], y[3]
-        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
-    if carries:
-        x[0, 1], x[0, 2], x[0, 3] = place  # to the last digit as the other lines at that point have it
-    return total < math.inf
-
-
-@inner
 def factor_dense(A, m):
     """Factor the m equations in the rows of A, for `substitute_dense`; False: they are singular.
 

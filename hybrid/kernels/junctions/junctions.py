@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from hybrid.kernels.algebra.block_elimination import substitute
 from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, vector
 from hybrid.kernels.junctions.bodies import (
     LINES,
@@ -69,7 +70,6 @@ from hybrid.kernels.junctions.joined_lines import (
     last_block,
     moment_of_end,
     place_frame,
-    solve_back,
     substitute_dense,
     turns,
 )
@@ -434,8 +434,12 @@ def correct_all(network, gaps, m):
             row += 1
         if start >= 0:
             place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
-        if not solve_back(job.work.X, columns, network.first[l], low, high, q, start >= 0, place, x, end >= 0):
+        if not substitute(job.work.X, x, end >= 0, (columns, network.first[l], low, high, q)):
             return l
+        if (
+            start >= 0
+        ):  # its shift and what it had still to go: to the last digit as the other lines at that point have it
+            x[0, 1], x[0, 2], x[0, 3] = place
     return -1
 
 

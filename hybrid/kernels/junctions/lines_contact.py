@@ -35,6 +35,7 @@ from hybrid.kernels.contact.self_contact import (
     is_gain,
     is_judged,
     length_of,
+    load_ends,
     load_vector,
     rotate_column,
     solve_columns,
@@ -58,20 +59,19 @@ from hybrid.kernels.junctions.borders import (
     NO_SOLUTION,
     PREDICT,
     SAFE_PART,
-    SPECTRAL_RADIUS,
-    add_corrections,
     answer_right_sides,
     clear_right_side,
     hand_on,
     keep_corrections,
     push_node,
+    put_corrections,
     read_network,
     task_of,
 )
 from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
+from hybrid.kernels.state.report import SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
 from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.line_step import (
     ASKED,
@@ -240,11 +240,7 @@ def spread(job, one, phase):
                 books.touch[row, i] = one.touch[row, at + i]
         if phase == FINISH:
             report[SELF_FRICTION_WORK] = work_on(job, one, k)
-            for end in range(2):
-                if line_job.ends.held[end] != 0:
-                    for j in range(3):
-                        report[FORCE_A + 3 * end + j] -= y[at + end * n, j]
-                        report[NET_A + 3 * end + j] -= y[at + end * n, j]
+            load_ends(line_job.ends, y, at, n, report)
     return last
 
 
@@ -523,14 +519,15 @@ def put_contact(network, job):
     keep_corrections(network, job.kept, job.moved)
     if not find_solution(network, job) or not respond(network, job, True):
         return NO_SOLUTION
-    add_corrections(network, 1.0, job.kept, job.moved)
+    put_corrections(network, 1.0, 1.0, job.kept, job.moved)
     return 1.0
 
 
 @inner
 def prepare_contact(network):
-    """Before a try of a step: the part of the prediction that is safe, of all lines."""
+    """Before a try of a step: the part of the prediction that is safe, of all lines; each line has the radius of all."""
     safe, task, t = 1.0, task_of(network.asked), network.asked.time
+    rho = task.rho
     for l in range(network.tables.shape[0]):
         job = read(network.tables[l])
         if touches(job):
@@ -538,17 +535,6 @@ def prepare_contact(network):
             clock.now, clock.try_end, clock.step_before, clock.rho = t - task.dt, t, task.before, task.rho
             clock.rho_before = task.rho_before
             safe = min(safe, ask_contact(job, PREPARE))
-    return safe
-
-
-@inner
-def largest_radius(network):
-    """The spectral radius of a step that is prepared, so that each line has that of all."""
-    task = task_of(network.asked)
-    rho = task.rho
-    for l in range(network.tables.shape[0]):
-        job = read(network.tables[l])
-        if touches(job):
             rho = min(rho, ask_contact(job, RADIUS))
     common = with_radius(task, rho)
     for l in range(network.tables.shape[0]):
@@ -559,7 +545,8 @@ def largest_radius(network):
             if own > rho:
                 clock.rho *= rho / own
             clock.step_before, clock.rho_before = common.before, common.rho_before
-    return rho
+    network.asked.rho_of_step = rho
+    return safe
 
 
 @inner
@@ -581,8 +568,6 @@ def touch_network(table):
     question = network.phase[0]
     if question == PREDICT:
         return prepare_contact(network)
-    if question == SPECTRAL_RADIUS:
-        return largest_radius(network)
     if question == COUPLE:
         return put_contact(network, job)
     if question == SAFE_PART:

@@ -24,7 +24,6 @@ from hybrid.kernels.junctions.borders import (
     AGAIN,
     COUPLE,
     UPDATE,
-    add_corrections,
     answer_right_sides,
     clear_right_side,
     eliminate_right_side,
@@ -89,7 +88,7 @@ def put_unknowns(network, job, winds, count, with_left):
         left = change_of(network, job, winds, j)
         if with_left:
             left += job.unknowns[j, LEFT_OVER]
-        add_corrections(network, -left / job.unknowns[j, YIELDING], job.answers[j], job.carried[j])
+        put_corrections(network, 1.0, -left / job.unknowns[j, YIELDING], job.answers[j], job.carried[j])
 
 
 @inner
@@ -141,7 +140,7 @@ def couple(network, job, winds):
     for j in range(count):
         if not find_answer(network, job, winds, j):
             return 0.0
-    put_corrections(network, job.kept, job.moved)
+    put_corrections(network, 0.0, 1.0, job.kept, job.moved)
     put_unknowns(network, job, winds, count, True)
     return 1.0
 

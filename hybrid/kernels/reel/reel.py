@@ -188,7 +188,7 @@ def answer_of_cell(line, state, winch, X, W, columns, c, at):
         substitute_planar(line.plane, X, x)
     else:
         solve_backward(X, column, 0)
-        substitute(X, x)
+        substitute(X, x, False, None)
     return column[at, 0], x[at, 0]
 
 

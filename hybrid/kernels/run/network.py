@@ -32,7 +32,6 @@ from hybrid.kernels.junctions.borders import (
     END,
     FORCE,
     PREDICT,
-    SPECTRAL_RADIUS,
     START,
     ask,
     read_network,
@@ -57,7 +56,6 @@ from hybrid.kernels.state.report import (
     RESIDUAL,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
-    SLACKEST,
     SLACKEST_CELL,
     TOUCHES,
 )
@@ -76,7 +74,6 @@ from hybrid.kernels.step.accept import (
 )
 from hybrid.kernels.step.line_step import (
     ASSEMBLY,
-    GAIN,
     OK,
     REST,
     SINGULAR,
@@ -89,7 +86,7 @@ from hybrid.kernels.step.line_step import (
     call_reel,
     carry,
     end_line_step,
-    may_gain,
+    judge_line,
     read,
     round_off_tension,
     rubs,
@@ -189,24 +186,20 @@ def begin_lines(tables, s, safe):
 def end_lines(tables, joints, floors, s, task, good):
     """Rates after a step of all lines, and if it is good their reports.
 
-    Returns -1, or a line whose cell turns too far, or is slack, or whose contact creates energy, and that turn (0: slack)
-    and cell.
+    Returns OK or why the step of a line is refused, the line and its cell.
     """
     for l in range(tables.shape[0]):
         job = read(tables[l])
         find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
         if good:
-            far, turn, cell = end_line_step(None, 1, task, job, states_of(job), s)
+            far, _, cell = end_line_step(None, 1, task, job, states_of(job), s)
             if far:
-                return l, turn, cell
-            report = job.work.report
-            if may_gain(job, task.dt):
-                move_joints(job, joints[l, START], joints[l, END])
-                if ask_contact(job, GAIN) > 0.0:
-                    return l, turn, cell  # it creates energy: in halves
-            if not report[SLACKEST] > floors[l]:
-                return l, 0.0, int(report[SLACKEST_CELL])
-    return -1, 0.0, -1
+                return TURNED_TOO_FAR, l, cell
+            move_joints(job, joints[l, START], joints[l, END])
+            outcome = judge_line(job, task.dt, floors[l])
+            if outcome != OK:
+                return outcome, l, int(job.work.report[SLACKEST_CELL]) if outcome == SLACK else cell
+    return OK, -1, -1
 
 
 @inner
@@ -306,10 +299,10 @@ def end_network_step(network, task, s, solved):
 
     Whoever keeps it books it (book_network_step).
     """
-    line, turn, cell = end_lines(network.tables, network.joints, network.floors, s, task, solved)
+    outcome, line, cell = end_lines(network.tables, network.joints, network.floors, s, task, solved)
     turned = end_bodies(network.old, network.new, network.work, s)
-    if line >= 0:
-        return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
+    if outcome != OK:
+        return outcome, line, cell
     if solved and not turned < LARGEST_STEP_TURN:
         return TURNED_TOO_FAR, -1, -1
     return OK, -1, -1
@@ -330,8 +323,8 @@ def predict_step(network, task, t):
 
     Its task and scheme, whether something turns too far, and by how much (rad), its line (-1: a body) and cell.
     """
-    safe, rho = ask(network, PREDICT), min(task.rho, ask(network, SPECTRAL_RADIUS))
-    task = with_radius(task, rho)
+    safe = ask(network, PREDICT)
+    task = with_radius(task, network.asked.rho_of_step)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)
     turn, _ = predict_bodies(network.old, network.new, network.work, s)
     if not turn < LARGEST_STEP_TURN:

@@ -49,21 +49,19 @@ from hybrid.kernels.state.books import (
     Clock,
     Counts,
 )
-from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
+from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import note_cuts, renew_accelerations, watch_push
 from hybrid.kernels.step.line_step import (
     CUT_SHORT,
-    GAIN,
     OK,
     SLACK,
     STEP,
     TURNED_TOO_FAR,
-    ask_contact,
     call_follower,
     call_itself,
     call_solver,
-    may_gain,
+    judge_line,
     read,
 )
 from hybrid.kernels.step.step_control import begin_step, end_of_try, halve, note_past, passes
@@ -226,10 +224,10 @@ def try_lone(steps, network):
         outcome, it, left, where = call_solver(steps.marchers[j], steps.lone[j])
         if outcome == CUT_SHORT:
             outcome, steps.counts.is_cut = OK, 1
-        if outcome == OK and may_gain(job, clock.try_end - clock.now) and ask_contact(job, GAIN) > 0.0:
-            outcome = TURNED_TOO_FAR  # in halves
-        if outcome == OK and not job.work.report[SLACKEST] > network.floors[l]:
-            outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
+        if outcome == OK:
+            outcome = judge_line(job, clock.try_end - clock.now, network.floors[l])
+            if outcome == SLACK:
+                where = int(job.work.report[SLACKEST_CELL])
         if outcome != OK:
             return outcome, l, it, left, where
         most, worst = max(most, it), max(worst, left)

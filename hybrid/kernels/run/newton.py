@@ -181,7 +181,7 @@ def correct_line(plane, space, of, task, s, where):
         return OK, 0, where
     after_march(job, task.what)
     if space is not None:
-        good = substitute(work.X, work.x)
+        good = substitute(work.X, work.x, False, None)
     if plane is not None:
         good = substitute_planar(plane, work.X, work.x)
     coupled = couple(space, job, states, s, task.what, good)

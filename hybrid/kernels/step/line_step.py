@@ -35,7 +35,7 @@ from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.march import AT_REST
 from hybrid.kernels.march.zone_torque import BEFORE_MARCH, CORRECT, pass_torque
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.report import AXIAL_LAW, BENDING_SLIP, FRICTION, HELD_SLIP, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.report import AXIAL_LAW, BENDING_SLIP, FRICTION, HELD_SLIP, SELF_CONTACT_ENERGY, SLACKEST
 from hybrid.kernels.state.state import (
     Ends,
     Floats,
@@ -270,9 +270,12 @@ def rubs(job):
 
 
 @inner
-def may_gain(job, dt):
-    """Whether a step of dt (s) is repeated in halves where contact of the line with itself has put energy in."""
-    return touches(job) and job.reel == 0 and 0.5 * dt >= job.books.clock.shortest
+def judge_line(job, dt, floor):
+    """Outcome of a step of dt (s) that is solved: in halves where contact has put energy in; slack below floor (N)."""
+    may_gain = touches(job) and job.reel == 0 and 0.5 * dt >= job.books.clock.shortest
+    if may_gain and ask_contact(job, GAIN) > 0.0:
+        return TURNED_TOO_FAR
+    return OK if job.work.report[SLACKEST] > floor else SLACK
 
 
 # --- borders of a line: one question of all of them ----------------------------------------------------------
