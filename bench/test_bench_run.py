@@ -163,8 +163,8 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         begin = time.process_time()
         for k in range(1, steps + 1):
             sea, ends, old, new, was, now = model.sea.at_time(0.1 * k), model.ends.at_time(0.1 * k), new, old, now, was
-            task = newton.step_task(0.1, 0.1 * (k > 1), 0.5, limits, 0.5)
-            outcome, iterations, *_ = newton.step(task, line, sea, ends, States(old, new, was, now), work)
+            task = newton.Task(newton.STEP, 0.1, 0.1 * (k > 1), 0.5, limits=limits, rho_before=0.5)
+            outcome, iterations, *_ = newton.solve_task(task, line, sea, ends, States(old, new, was, now), work)
             assert outcome == hybrid.Outcome.OK
             total += iterations
         return time.process_time() - begin, total

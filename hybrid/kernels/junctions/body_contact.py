@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, get3, madd, mat_mat, mat_vec, mscale, msub, sub, vector
+from hybrid.kernels.algebra.sparse_rows import factor_dense, substitute_dense
 from hybrid.kernels.junctions.bodies import FRAME, LINES, PLACE, SOFTEST, SPRING, U, V, W, X, matrix
 from hybrid.kernels.junctions.borders import (
     AGAIN,
@@ -43,7 +44,6 @@ from hybrid.kernels.junctions.borders import (
     put_corrections,
     read_network,
 )
-from hybrid.kernels.junctions.joined_lines import factor_dense, substitute_dense
 from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
 from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, put_vector, row3, transposed
 from hybrid.kernels.machine.compile import called, inner, kernel
@@ -92,7 +92,7 @@ class MeetingJob(NamedTuple):
     moved: Rows  # (B, 6) and of bodies
     responses: Blocks  # (12 S, T, 5) of lines
     turned: Blocks  # (12 S, B, 6) of bodies
-    coupling: Rows  # (12 S + 5, 12 S + 1), as kernels.junctions.joined_lines.factor_dense has it
+    coupling: Rows  # (12 S + 5, 12 S + 1), as kernels.algebra.sparse_rows.factor_dense has it
     rank: int = 0
 
 

@@ -29,8 +29,6 @@ replaced by its place, and its moment, is carried to the other end as a linear f
 
 from __future__ import annotations
 
-import math
-
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN
 from hybrid.kernels.algebra.kept_factors import carry_block
 from hybrid.kernels.algebra.rotations import (
@@ -307,84 +305,3 @@ def count_right(X, parts, first, begin, end, left):
             + row[4] * X[p + 4 * SPAN]
         )  # fmt: skip
     return left
-
-
-@inner
-def factor_dense(A, m):
-    """Factor the m equations in the rows of A, for `substitute_dense`; False: they are singular.
-
-    By elimination with row pivoting, of rows and columns scaled to a largest number of about 1.
-    Most numbers of many lines are 0: a pivot row is subtracted where it has others, from rows that have one in its column.
-    A has m+5 rows, m+1 columns; its last rows: scales of the columns; columns and rows of a pivot; scales of the rows;
-    the row that was exchanged with each.
-    """
-    for c in range(m):
-        A[m, c] = 0.0
-    for r in range(m):
-        for c in range(m):
-            A[m, c] = max(A[m, c], abs(A[r, c]))
-    for c in range(m):
-        if not 0.0 < A[m, c] < math.inf:
-            return False
-        A[m, c] = 1.0 / A[m, c]
-    for r in range(m):
-        big = 0.0
-        for c in range(m):
-            A[r, c] *= A[m, c]
-            big = max(big, abs(A[r, c]))
-        if not big > 0.0:
-            return False
-        for c in range(m):
-            A[r, c] /= big
-        A[m + 3, r] = big
-    for c in range(m):
-        best, where, rows, count = abs(A[c, c]), c, 0, 0
-        for r in range(c + 1, m):
-            size = abs(A[r, c])
-            if size > 0.0:
-                A[m + 2, rows] = r
-                rows += 1
-                if size > best:
-                    best, where = size, r
-        if not best > 0.0:
-            return False
-        A[m + 4, c] = where
-        if where != c:
-            for j in range(m):
-                A[c, j], A[where, j] = A[where, j], A[c, j]
-        if rows > 0:
-            for j in range(c + 1, m):
-                if A[c, j] != 0.0:
-                    A[m + 1, count] = j
-                    count += 1
-        for i in range(rows):
-            r = int(A[m + 2, i])
-            f = A[r, c] / A[c, c]
-            A[r, c] = f
-            for k in range(count):
-                j = int(A[m + 1, k])
-                A[r, j] -= f * A[c, j]
-    return True
-
-
-@inner
-def substitute_dense(A, m):
-    """Solve the equations that `factor_dense` has factored for the right-hand side in their last column, in place."""
-    for r in range(m):
-        A[r, m] /= A[m + 3, r]
-    for c in range(m):
-        where = int(A[m + 4, c])
-        if where != c:
-            A[c, m], A[where, m] = A[where, m], A[c, m]
-    for c in range(m):
-        if A[c, m] != 0.0:
-            for r in range(c + 1, m):
-                if A[r, c] != 0.0:
-                    A[r, m] -= A[r, c] * A[c, m]
-    for c in range(m - 1, -1, -1):
-        y = A[c, m]
-        for j in range(c + 1, m):
-            y -= A[c, j] * A[j, m]
-        A[c, m] = y / A[c, c]
-    for c in range(m):
-        A[c, m] *= A[m, c]

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import substitute
 from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, vector
+from hybrid.kernels.algebra.sparse_rows import factor_dense, substitute_dense
 from hybrid.kernels.junctions.bodies import (
     LINES,
     X,
@@ -66,11 +67,9 @@ from hybrid.kernels.junctions.joined_lines import (
     carry_turn,
     count_right,
     end_row,
-    factor_dense,
     last_block,
     moment_of_end,
     place_frame,
-    substitute_dense,
     turns,
 )
 from hybrid.kernels.machine.compile import inner, kernel

@@ -29,6 +29,7 @@ import numpy as np
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.algebra.kept_factors import solve_with
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, spin_about, sub, transport
+from hybrid.kernels.algebra.sparse_rows import factor_dense, substitute_dense
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples, damped_compliance, twist_of_tensions
 from hybrid.kernels.laws.tension_torque import TORQUE as NODE_TORQUE
@@ -295,27 +296,6 @@ def unknown_of(line, torsion, j, x, cv):
 
 
 @inner
-def solve_dense(A):
-    """Solve A[:, :n] y = A[:, n] in place by elimination with pivoting; y is then in the last column."""
-    n = A.shape[0]
-    for c in range(n):
-        best = c
-        for r in range(c + 1, n):
-            if abs(A[r, c]) > abs(A[best, c]):
-                best = r
-        for k in range(c, n + 1):
-            A[c, k], A[best, k] = A[best, k], A[c, k]
-        for r in range(c + 1, n):
-            f = A[r, c] / A[c, c]
-            for k in range(c, n + 1):
-                A[r, k] -= f * A[c, k]
-    for c in range(n - 1, -1, -1):
-        for k in range(c + 1, n):
-            A[c, n] -= A[c, k] * A[k, n]
-        A[c, n] /= A[c, c]
-
-
-@inner
 def correct(line, state, work, cv, joined):
     """Correct the march's solution work.x for the torques that change with it."""
     torsion, x = work.torsion, work.x
@@ -339,7 +319,10 @@ def correct(line, state, work, cv, joined):
         if j < zones:
             size = line.torsion[j, COMPLIANCE] / damped_part(line, j, cv)
         A[j, j] += size
-    solve_dense(A)
+    if not factor_dense(A, m):
+        x[0, 1] = math.nan
+        return
+    substitute_dense(A, m)
     for j in range(m):
         y, column = A[j, m], torsion.columns[j]
         for i in range(x.shape[0]):
@@ -427,7 +410,7 @@ def torsion_of(line: Line, keep: bool) -> Torsion:
     return Torsion(
         passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
         columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), right=z((n + 1, SIZE)),
-        coupling=z((unknowns, unknowns)), dense=z((unknowns, unknowns + 1)),
+        coupling=z((unknowns, unknowns)), dense=z((unknowns + 5, unknowns + 1)),
     )  # fmt: skip
 
 

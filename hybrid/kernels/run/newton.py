@@ -394,7 +394,7 @@ class _OfThread(threading.local):
 _here = _OfThread()
 
 
-def _solve(task: Task, line: Line, sea: Sea, ends: Ends, states: States, work: Work) -> tuple[int, int, float, int]:
+def solve_task(task: Task, line: Line, sea: Sea, ends: Ends, states: States, work: Work) -> tuple[int, int, float, int]:
     """As kernels.run.newton.solve, by the kernel for the line's kind."""
     check_turns(line, states.new)
     table, (old, new, was, now) = _here.table, states
@@ -473,42 +473,20 @@ def out_of_balance(line: Line, rows: Floats) -> Floats:
     return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
 
 
-def step_task(dt: float, before: float, rho: float, limits: Limits, rho_before: float) -> Task:
-    """The task of one step: s, its length and that of the one before; rho, rho_before: their spectral radii."""
-    return Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before)
-
-
-def step(task: Task, line: Line, sea: Sea, ends: Ends, states: States, work: Work) -> tuple[int, int, float, int]:
-    """One step in time from states.old to states.new (overwritten)."""
-    return _solve(task, line, sea, ends, states, work)
-
-
-def equilibrium(
-    line: Line, sea: Sea, ends: Ends, state: State, ca: float, limits: Limits, turning: bool, work: Work
-) -> tuple[int, int, float, int]:
-    """One static solve from state.r + work.u; ca: 1/s2, of springs of that times the mass."""
-    task = Task(EQUILIBRIUM, ca=ca, turning=turning, limits=limits)
-    return _solve(task, line, sea, ends, States(state, state, NO_PUSH, NO_PUSH), work)
-
-
 def assembly(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
     """The block rows and the report of a state (kernels.march.assembly.march); -1, or a node whose block was singular."""
-    return _one_march(ASSEMBLY, line, sea, ends, state, cv, ca, work)
+    return assembly_of_step(line, sea, ends, state, state, cv, ca, work)
 
 
 def correction(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
     """As `assembly`, and the solution into work.x; -1, or a node whose block was singular."""
-    return _one_march(CORRECTION, line, sea, ends, state, cv, ca, work)
+    return assembly_of_step(line, sea, ends, state, state, cv, ca, work, CORRECTION)
 
 
-def assembly_of_step(line: Line, sea: Sea, ends: Ends, old: State, new: State, cv: float, ca: float, work: Work) -> int:
+def assembly_of_step(
+    line: Line, sea: Sea, ends: Ends, old: State, new: State, cv: float, ca: float, work: Work, what: int = ASSEMBLY
+) -> int:
     """As `assembly`, of a step from `old` by work.u to `new`, whose friction and rates count from there."""
-    task = Task(ASSEMBLY, cv=cv, ca=ca, limits=ONE_MARCH)
-    outcome, _, _, where = _solve(task, line, sea, ends, States(old, new, NO_PUSH, NO_PUSH), work)
-    return -1 if outcome == OK else max(where, 0)
-
-
-def _one_march(what: int, line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
     task = Task(what, cv=cv, ca=ca, limits=ONE_MARCH)
-    outcome, _, _, where = _solve(task, line, sea, ends, States(state, state, NO_PUSH, NO_PUSH), work)
+    outcome, _, _, where = solve_task(task, line, sea, ends, States(old, new, NO_PUSH, NO_PUSH), work)
     return -1 if outcome == OK else max(where, 0)

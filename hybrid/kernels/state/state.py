@@ -431,7 +431,9 @@ class Torsion(NamedTuple):
     known: Floats
     right: Floats  # (N+1, 5) a right-hand side
     coupling: Floats  # (K+F, K+F) how turns and those spins answer to the columns
-    dense: Floats  # (K+F, K+F+1) equations of the torques and of those spins
+    dense: (
+        Floats  # (K+F+5, K+F+1) equations of the torques and of those spins (kernels.algebra.sparse_rows.factor_dense)
+    )
 
 
 class Work(NamedTuple):
