@@ -30,6 +30,7 @@ import numpy as np
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.kernels.machine.cache import compiler_hash
 from hybrid.kernels.mesh.cell_errors import CURVATURE, QUANTITIES
+from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.contents import passing_each_other, self_reach
@@ -170,7 +171,8 @@ def _renamed(saved: dict[str, Any]) -> dict[str, Any]:
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
     """The zones of a checkpoint, also of an older version.
 
-    Those had no cells that follow, one largest curvature, no velocities, nothing of kinks, or other names.
+    Those had no cells that follow, one largest curvature, no velocities, nothing of kinks, other names, or fewer
+    criteria: those that came later begin with nothing.
     """
     saved = {"following": None} | saved
     following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
@@ -183,7 +185,10 @@ def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
         if isinstance(idle := following.get("idle_steps"), np.ndarray):
             saved["following"] = {"waves": np.zeros(idle.shape)} | following
     if isinstance(manager, dict):
-        saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | _renamed(manager)
+        manager = saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | _renamed(manager)
+        for name in ("ratios", "seen"):
+            if isinstance(found := manager.get(name), np.ndarray):
+                manager[name] = np.pad(found, ((0, len(CRITERIA) - len(found)), (0, 0)))
     return saved
 
 

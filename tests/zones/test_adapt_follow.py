@@ -16,6 +16,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine import binding
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
+from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.mesh.zone_step import blank_zone_job, read_arcs
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import one_line
@@ -380,13 +381,15 @@ def test_what_is_asked_along_the_line_is_a_share_of_the_rule(asked: str, share: 
 
 
 def test_zones_of_an_older_checkpoint() -> None:
-    """It had one largest curvature, or none; that it did not look at velocities is tested with them."""
+    """It had one largest curvature, or none, or fewer criteria; that it did not look at velocities is tested with them."""
     rest = {"true": np.ones(3), "idle_steps": np.zeros(4), "waves": np.zeros(4)}
     found = zoning_of_today({"manager": {"ratios": 1}, "following": rest | {"peak": 0.2}})
     assert found["following"] == rest and found["manager"]["largest"].tolist() == [0, 0, 0.2, 0]
     assert zoning_of_today({"manager": {"ratios": 1}})["following"] is None
     own = {"largest": np.ones(4)}
     assert zoning_of_today({"manager": own, "following": rest})["manager"]["largest"].tolist() == [1, 1, 1, 1]
+    fewer = zoning_of_today({"manager": {x: np.ones((len(CRITERIA) - 2, 3)) for x in ("ratios", "seen")}})["manager"]
+    assert all(np.sum(fewer[x], axis=1).tolist() == [3.0] * (len(CRITERIA) - 2) + [0.0] * 2 for x in ("ratios", "seen"))
     names = {"haste": "ramp_factor", "calm_since": "below_since", "calmed": "release_cause", "patience": "wait_factor"}
     assert (
         zoning_of_today({"manager": {x: x for x in names}})["manager"].items()
