@@ -17,7 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hybrid.accuracy.api import resume, run, static
+    from hybrid.accuracy.passes import resume, run, static
     from hybrid.accuracy.run_forecast import plan
     from hybrid.couple.fmu_export import export_fmu
     from hybrid.designs.design import design, openmdao_component
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 # Public names by the file that has them, and what those are called there that have another name.
 _FILES = {
-    "accuracy.api": ("resume", "run", "static"),
+    "accuracy.passes": ("resume", "run", "static"),
     "accuracy.run_forecast": ("plan",),
     "couple.fmu_export": ("export_fmu",),
     "designs.design": ("design", "openmdao_component"),

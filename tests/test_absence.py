@@ -33,7 +33,7 @@ from hybrid.kernels.state.report import (
 from hybrid.kernels.state.state import state_for
 from hybrid.model.build import Model, build
 from hybrid.scene.read import one_line
-from hybrid.solve.borders import JointJobs
+from hybrid.solve.line_jobs import JointJobs
 from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 BARE = {"length": 2.0, "mass": 0.1}

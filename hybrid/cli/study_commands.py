@@ -328,7 +328,7 @@ def study(
         raise UsageError("--derivatives goes with --sensitivity RESULT")
     with session(as_json, quiet) as console:
         if netcdf is not None:
-            from hybrid.store.selection import check_target
+            from hybrid.store.reader import check_target
 
             check_target(netcdf, overwrite=True)  # before the work
         if case is not None:
@@ -395,7 +395,7 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
     if empty:
         console.note(f"note: {', '.join(empty)}: in no case (too few peaks or up-crossings in the record)")
     if netcdf is not None:
-        from hybrid.store.selection import write_atomically
+        from hybrid.store.reader import write_atomically
 
         write_atomically({netcdf: found.to_netcdf(engine="h5netcdf")}, overwrite=True)
     text = f"{counts['done']} cases done, {counts['failed']} failed, in {span(wall)} of wall time"

@@ -18,7 +18,7 @@ from cosseratbench.scenario import Cylinder, End, EndCondition, Motion, Rod, Sce
 from cosseratbench.solver import Capability, Diverged
 from cosseratbench.trajectory import Trajectory
 
-from hybrid.accuracy.api import run
+from hybrid.accuracy.passes import run
 from hybrid.errors import ComputationError, SceneError
 
 STEPS = 1000  # to the slowest period of a scenario

@@ -20,7 +20,7 @@ from hybrid.scene.base import places_of_files
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.root import Scene
 from hybrid.simulation.stepping import Simulation
-from hybrid.store.selection import check_target, write_atomically
+from hybrid.store.reader import check_target, write_atomically
 
 # In the folder `resources` of the unit.
 SCENE, INTERFACE = "scene.yaml", "interface.json"

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from hybrid.accuracy.api import first_at_rest
+from hybrid.accuracy.passes import first_at_rest
 from hybrid.designs.line_at_rest import (
     LEFT_OUT,
     NO_FRAMES,

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.accuracy.api import run
+from hybrid.accuracy.passes import run
 from hybrid.errors import PUSHED, ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import places_of

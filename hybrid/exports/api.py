@@ -39,11 +39,11 @@ from hybrid.errors import ResultError, optional_package
 from hybrid.store.envelope import BEGIN, END, SCALE
 from hybrid.store.histories import Bends, bends_of
 from hybrid.store.obstacle_surfaces import obstacles_at, triangles_of
-from hybrid.store.reader import Result
-from hybrid.store.selection import (
+from hybrid.store.reader import (
     MARK,
     Numbers,
     Part,
+    Result,
     Window,
     check_target,
     error_name,

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from hybrid.accuracy.api import first_at_rest, run
+from hybrid.accuracy.passes import first_at_rest, run
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, PLACE, V

@@ -46,10 +46,10 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene, read_text, scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.integrity import Tree, matched, pack
 from hybrid.store.reader import Result, open_result
+from hybrid.store.whole_file import Checkpoint, read_before, read_checkpoint
 from hybrid.zones.manager import UserCriterion
 
 FIRST_WORKS = 11  # works that were booked once

@@ -31,19 +31,18 @@ from hybrid.simulation.parts import EVERY_STEP, Part, Parts
 from hybrid.simulation.progress import at_once
 from hybrid.simulation.restart import LoadChange, kept_resolution, other_program, refused, require_same
 from hybrid.simulation.run_contact import RunContact, refuse_within_itself
-from hybrid.simulation.run_failures import Cuts, Failures
 from hybrid.simulation.run_of_lines import LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
 from hybrid.simulation.run_record import ALONE, RecordedRun, Recording, RunFile, RunRecorder, kept_changes, restore
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
+from hybrid.simulation.run_steps import Cuts, Failures, VibrationsOfLines, VibrationSteps
 from hybrid.simulation.run_zones import RunZones
-from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
 from hybrid.simulation.zones_at_rest import Start, managers_for, start_at_rest, zones_as_placed
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_steps import ROWS, NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState
-from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.format import Target, Text
 from hybrid.store.hdf5_file import opened
+from hybrid.store.whole_file import read_checkpoint
 from hybrid.store.writer import Recorder
 from hybrid.zones.manager import DomainManager, UserCriterion
 

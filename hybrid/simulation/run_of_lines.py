@@ -39,9 +39,9 @@ from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import MOST_SAMPLED, NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
-from hybrid.store.checkpoint import digest_of
 from hybrid.store.format import Target
 from hybrid.store.stored_rows import ComparisonRecorder
+from hybrid.store.whole_file import digest_of
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
 from hybrid.zones.manager import UserCriterion

@@ -61,13 +61,13 @@ from hybrid.simulation.zones_at_rest import Start
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_steps import no_extremes
 from hybrid.solve.stepper import LineFailed, NetworkState
-from hybrid.store.checkpoint import Checkpoint, read_checkpoint
 from hybrid.store.format import Field, Header, Text, made
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import matched
 from hybrid.store.recorder import Rows
 from hybrid.store.records import PENDING, RODS_AT_START
 from hybrid.store.stored_rows import ComparisonRecorder
+from hybrid.store.whole_file import Checkpoint, read_checkpoint
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
 from hybrid.zones.change import reasons_at_start
 from hybrid.zones.manager import DomainManager

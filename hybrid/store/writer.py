@@ -31,7 +31,6 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s
 
-from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, check_tables, create_slots, write_before, write_slot
 from hybrid.store.format import (
     EVENTS,
     ArrayContents,
@@ -72,7 +71,19 @@ from hybrid.store.hdf5_file import (
 from hybrid.store.integrity import Tree, copy_unsigned, pack, sign, sign_new
 from hybrid.store.recorder import NUMBERS, Rows, Table, pause, write_rows
 from hybrid.store.records import FINER_RESULT, PENDING
-from hybrid.store.whole_file import LateFile, Restart, image_of_result, write_result
+from hybrid.store.whole_file import (
+    BEFORE,
+    SLOTS,
+    Checkpoint,
+    LateFile,
+    Restart,
+    check_tables,
+    create_slots,
+    image_of_result,
+    write_before,
+    write_result,
+    write_slot,
+)
 
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here
 NOTHING_MORE: Tree = {}  # what a run that is done leaves to go on with

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.accuracy.api import run
+from hybrid.accuracy.passes import run
 from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
 from hybrid.scene.analysis import LEAST_DAMPED, Model, of_length
 from hybrid.scene.base import by_kinds, dotted

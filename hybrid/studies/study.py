@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.accuracy.api import run, static
+from hybrid.accuracy.passes import run, static
 from hybrid.errors import Complaint, ResultError, SceneError, optional_package
 from hybrid.model.plan import plan
 from hybrid.outputs.probes import PROBES

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.accuracy.api import run, static
+from hybrid.accuracy.passes import run, static
 from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, ResultError, SceneError
 from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.simulation.own_parts import RunPart

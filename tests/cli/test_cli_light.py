@@ -53,7 +53,7 @@ def test_plan_draws_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch
     assert "4 cells" in out and "matplotlib" not in modules
     hybrid.run(hybrid.validate_scene(HANGING), "hanging.h5").close()
     out, modules = call("plot", "hanging.h5")
-    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.accuracy.api"}
+    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.accuracy.passes"}
 
 
 @pytest.mark.long

@@ -23,8 +23,8 @@ import numpy as np
 from bits import differences
 
 import hybrid
-from hybrid.store.checkpoint import BEFORE, SLOTS, read_checkpoint
 from hybrid.store.integrity import MAGIC, pack
+from hybrid.store.whole_file import BEFORE, SLOTS, read_checkpoint
 
 MEMORY = 1 << 30  # bytes
 BOMB = 1 << 32  # bytes, of zeros in 4 MB

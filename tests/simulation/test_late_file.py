@@ -12,7 +12,7 @@ import pytest
 from bits import Stopping, differences
 
 import hybrid
-from hybrid.accuracy import api
+from hybrid.accuracy import passes
 from hybrid.simulation.progress import RESULT, Progress
 from hybrid.store import whole_file, writer
 from hybrid.store.format import ArrayContents
@@ -118,7 +118,7 @@ def test_it_is_there_when_the_run_is_stopped_and_goes_on(tmp_path: Path, monkeyp
         calls.clear()
         asked = nullcontext(lambda stop=stop: calls.append(0) or len(calls) >= stop)
         with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-            patched.setattr(api, "interrupts", lambda asked=asked: asked)
+            patched.setattr(passes, "interrupts", lambda asked=asked: asked)
             hybrid.run(described(True), tmp_path / "run.h5")
         with hybrid.open(tmp_path / "run.h5") as result:
             assert result.status == status and (result.times[-1] == 2.0) == (status == "complete")

@@ -15,8 +15,8 @@ from bits import Stopping, differences, machine_code, went_on
 import hybrid
 from hybrid.errors import OMITTED
 from hybrid.store import recorder as record
-from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
+from hybrid.store.whole_file import read_checkpoint
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Adaptive zones, friction, seas, a plane, the model error, steps that follow the error, a climb to an accuracy with

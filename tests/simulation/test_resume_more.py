@@ -18,7 +18,7 @@ from hybrid.errors import OTHER_PROGRAM
 from hybrid.scene.root import in_full
 from hybrid.simulation import case, restart, zones_at_rest
 from hybrid.simulation.progress import ESTIMATION, RESULT
-from hybrid.store import checkpoint, hdf5_file
+from hybrid.store import hdf5_file, whole_file
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import pack, unpack
@@ -69,7 +69,7 @@ def test_beyond_the_end_of_an_accuracy_the_whole_is_judged(tmp_path):
         assert len(longer["errors/total/position"]) == len(longer.times)
         assert "time: {duration: 8.0" in longer.scene_text
     with h5py.File(tmp_path / "run.h5") as file:
-        assert checkpoint.BEFORE not in file
+        assert whole_file.BEFORE not in file
 
 
 @pytest.mark.long
@@ -104,7 +104,7 @@ def test_a_change_is_made_where_the_run_stands_and_not_at_its_last_output(tmp_pa
     scene = in_full(swinging(output={"every": 1.0, "points": 11}))
     path = stopped(tmp_path / "run.h5", monkeypatch, scene, 160)
     with opened(path) as file:
-        point = checkpoint.read_checkpoint(file)
+        point = whole_file.read_checkpoint(file)
     t, more = point.state["t"], {"settings": ["environment.fluid.current=[0.9, 0, 0]"]}
     assert point.t == 1.0 and 1.2 < t < 1.7
     with pytest.raises(hybrid.ResultError, match="computes the run anew"):
@@ -155,7 +155,7 @@ def test_another_program_goes_on_and_says_so(tmp_path, monkeypatch, whole):
     """The format of the checkpoint decides, not the program; that bits may differ is an event."""
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path) as file:
-        t = checkpoint.read_checkpoint(file).t
+        t = whole_file.read_checkpoint(file).t
     monkeypatch.setattr(restart, "program", lambda: "9.9.9 0123456789abcdef")
     with hybrid.resume(path) as result, hybrid.open(whole) as same:
         (event,) = (e for e in result.events if e.kind == OTHER_PROGRAM)
@@ -177,16 +177,16 @@ def test_a_checkpoint_that_was_cut_off_leaves_the_one_before(tmp_path, monkeypat
     hybrid.run(swinging(), tmp_path / "whole.h5").close()
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path, "r+") as file:
-        newest = checkpoint.read_checkpoint(file)
-        slot = file[checkpoint.SLOTS[newest.number % 2]]
+        newest = whole_file.read_checkpoint(file)
+        slot = file[whole_file.SLOTS[newest.number % 2]]
         slot[200:400] = 0
-        older = checkpoint.read_checkpoint(file)
+        older = whole_file.read_checkpoint(file)
         assert older.number == newest.number - 1 and older.state["t"] < newest.state["t"]
     hybrid.resume(path).close()
     assert differences(tmp_path / "whole.h5", path) == []
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path, "r+") as file:
-        for name in checkpoint.SLOTS:
+        for name in whole_file.SLOTS:
             file[name][50:90] = 0
     with pytest.raises(hybrid.ResultError, match="no checkpoint"):
         hybrid.resume(path)
@@ -406,7 +406,7 @@ def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
     """Its digest is right, and what it says is not."""
     path = stopped(tmp_path / "run.h5", monkeypatch)
     with h5py.File(path) as file:
-        point = checkpoint.read_checkpoint(file)._asdict()
+        point = whole_file.read_checkpoint(file)._asdict()
     lines = "lines" in point["state"]  # else a file by the road of cables
     finely, of_line = point["resolution"], point["state"]["lines"]["cable"] if lines else point["state"]
 
@@ -425,9 +425,9 @@ def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
     ]  # fmt: skip
     for wrong in odd:
         with h5py.File(path, "r+") as file:
-            for name in checkpoint.SLOTS:  # both, so that there is none to fall back on
+            for name in whole_file.SLOTS:  # both, so that there is none to fall back on
                 file[name][:] = 0
-            checkpoint.write_slot([file[checkpoint.SLOTS[0]]], 0, pack(point | {"number": 0} | wrong))
+            whole_file.write_slot([file[whole_file.SLOTS[0]]], 0, pack(point | {"number": 0} | wrong))
         with pytest.raises(hybrid.ResultError, match="checkpoint"):
             hybrid.resume(path)
 
@@ -462,7 +462,7 @@ def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeyp
         places.append([])
         hybrid.run(swinging(), tmp_path / f"{k}.h5").close()
         with opened(tmp_path / f"{k}.h5") as file:
-            points = [checkpoint._checkpoint(unpack(bytes(file[name][()]))) for name in checkpoint.SLOTS]
+            points = [whole_file._checkpoint(unpack(bytes(file[name][()]))) for name in whole_file.SLOTS]
         kept.append([(x.number, x.t, x.rows, x.state["steps"]) for x in points])
     assert places[0] == places[1] and len(places[0]) == 6  # of 200 steps: the first, after 42, 84, 126, 168, the last
     assert kept[0] == kept[1]

@@ -29,9 +29,9 @@ from hybrid.errors import OTHER_PROGRAM, ResultError
 from hybrid.scene.read import one_line
 from hybrid.simulation import restart
 from hybrid.simulation.restart import as_of_line
-from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import open_result
+from hybrid.store.whole_file import read_checkpoint
 from tests.scenes import cable_scene, pinned_at
 
 DATA = Path(__file__).parents[1] / "data"

@@ -17,8 +17,8 @@ from test_result_first import make_rough
 import hybrid
 from hybrid.simulation import case as cases
 from hybrid.simulation.progress import REFINEMENT, Progress
-from hybrid.store.checkpoint import read_before
 from hybrid.store.hdf5_file import opened
+from hybrid.store.whole_file import read_before
 
 TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 

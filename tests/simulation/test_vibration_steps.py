@@ -22,7 +22,7 @@ from hybrid.model.resolution import first_resolution
 from hybrid.scene.read import as_scene, one_line
 from hybrid.scene.root import LINE
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.vibration_steps import VibrationsOfLines, VibrationSteps
+from hybrid.simulation.run_steps import VibrationsOfLines, VibrationSteps
 from hybrid.simulation.watches import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
 from tests.said import line_of, said
 from tests.scenes import cable_scene, pinned_at

@@ -23,11 +23,11 @@ from hybrid.simulation import run as run_module
 from hybrid.simulation.line_result import LineResult
 from hybrid.store import hdf5_file, writer
 from hybrid.store import whole_file as store
-from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.format import Field, Header, MemoryTarget
 from hybrid.store.hdf5_file import opened
 from hybrid.store.reader import open_result
 from hybrid.store.recorder import Rows
+from hybrid.store.whole_file import read_checkpoint
 from hybrid.store.writer import Recorder, WriteMode
 from tests.scenes import line_between, network_scene
 

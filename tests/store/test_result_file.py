@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import api
+from hybrid.accuracy import passes
 from hybrid.errors import ResultError
 from hybrid.exports.api import export
 from hybrid.simulation.case import Case
@@ -25,10 +25,9 @@ from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field, Header
 from hybrid.store.hdf5_file import SLOTS, bound_metadata, created, in_memory
-from hybrid.store.reader import Result, open_result
+from hybrid.store.reader import MARK, Result, open_result
 from hybrid.store.recorder import Rows
 from hybrid.store.records import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, Event, Zone
-from hybrid.store.selection import MARK
 from hybrid.store.writer import Recorder
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
@@ -623,7 +622,7 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
 
     output = LineResult.output
     monkeypatch.setattr(LineResult, "output", shown)
-    monkeypatch.setattr(api, "Case", Spy)
+    monkeypatch.setattr(passes, "Case", Spy)
     monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
     result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")
     kinds = {tuple(mesh.kinds) for mesh in result.mesh}

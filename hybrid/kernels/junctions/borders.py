@@ -14,7 +14,7 @@ answers to its columns, q its functional, d its block and r what its equations l
     y = -(d + q z)^-1 (r + q x),    x becomes x + z y.
 
 Borders that a network does not have are not in its list: it has neither their arrays nor their code, and asks nothing.
-The list, and why it has that order, is in solve.borders.
+The list, and why it has that order, is in solve.line_jobs.
 """
 
 from __future__ import annotations
