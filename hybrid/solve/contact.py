@@ -130,6 +130,14 @@ def forces_on_nodes(contact: Contact) -> Floats:
     return out
 
 
+def count_in(report: Floats, energy: float, force: Floats, ends: Ends) -> None:
+    """Put energy, J, and what forces (N+1, 3) N of contact do to held ends into the report of a line."""
+    report[SELF_CONTACT_ENERGY] = energy
+    for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
+        for at in (FORCE_A + 3 * k, NET_A + 3 * k):
+            report[at : at + 3] += force[-k]
+
+
 class ContactBooks:
     """What goes on from step to step of contact, of one line with itself or of several."""
 
@@ -245,10 +253,7 @@ class SelfContact(ContactBooks):
         self._work.u[:] = 0.0
         force, energy = self.force(state), self.energy()
         self.contact.numbers.stored = self.contact.numbers.tried
-        report[SELF_CONTACT_ENERGY] = energy
-        for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
-            for at in (FORCE_A + 3 * k, NET_A + 3 * k):
-                report[at : at + 3] += force[-k]
+        count_in(report, energy, force, ends)
         return energy
 
     @property
@@ -414,11 +419,7 @@ class SharedContact(ContactBooks):
         numbers, shares = self.contact.numbers, self.contact.shares
         numbers.stored = numbers.tried
         for j, (k, force) in enumerate(self.forces().items()):
-            report = works[k].report
-            report[SELF_CONTACT_ENERGY] = float(shares[j, :SLIP_WITHIN].sum())
-            for end in np.flatnonzero(ends[k].held):
-                for at in (FORCE_A + 3 * end, NET_A + 3 * end):
-                    report[at : at + 3] += force[-end]
+            count_in(works[k].report, float(shares[j, :SLIP_WITHIN].sum()), force, ends[k])
 
     @property
     def deepest_pair(self) -> tuple[int, int, int, int, float]:

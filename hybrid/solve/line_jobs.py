@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE
 from hybrid.kernels.contact.self_contact import blank_contact_job
+from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
 from hybrid.kernels.junctions.bodies import WORK, U
 from hybrid.kernels.junctions.body_contact import CARRY, EACH_BODY, TOUCHED, blank_meeting_job, meet_bodies
 from hybrid.kernels.junctions.borders import (
@@ -35,7 +36,7 @@ from hybrid.kernels.junctions.borders import (
 )
 from hybrid.kernels.junctions.joined_lines import ANSWER, COLUMNS, FUNCTIONAL, SEAT, TURNS
 from hybrid.kernels.junctions.junctions import HANDED, join_lines, twist_lines
-from hybrid.kernels.junctions.lines_contact import blank_touching_job, room_for_products, touch_network
+from hybrid.kernels.junctions.lines_contact import blank_touching_job, touch_network
 from hybrid.kernels.junctions.sheaves_and_winches import EACH_UNKNOWN, blank_unknowns_job, spin_sheaves, wind_lines
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
@@ -206,7 +207,8 @@ def contact_of(
 
 def room_to_touch(nodes: int, bodies: int, rests: NDArray[np.int64]) -> Values:
     """Room of contact; rests: (1,) 1: of a state in which no step is tried."""
-    return {"hessenberg": room_for_products(), "rests": rests} | room_to_keep(nodes, bodies)
+    columns = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4))
+    return {"hessenberg": columns, "rests": rests} | room_to_keep(nodes, bodies)
 
 
 # --- tables of lines ---------------------------------------------------------------------------

@@ -48,6 +48,7 @@ from hybrid.kernels.contact.self_contact_pairs import (
     Contact,
     farthest_from_mean,
     find_points,
+    first_in_contact,
     foresee_nearness,
     keep_pairs,
     limit,
@@ -113,15 +114,6 @@ def enough(s, width, size):
     return max(s * max(SOLVED, min(PART_LEFT * s / scale, LARGEST_LEFT)), LEAST_LEFT * scale)
 
 
-@inner
-def first_node(contact):
-    """The first node in contact."""
-    first = contact.nodes[0]
-    for k in range(contact.counts.nodes):
-        first = min(first, contact.nodes[k])
-    return first
-
-
 @called
 def respond(ends, contact, work, with_gradient, begin):
     """contact.z = A^-1 (H x + g) from node `begin` on, g where asked; x of the nodes in contact."""
@@ -135,7 +127,7 @@ def respond(ends, contact, work, with_gradient, begin):
         for j in range(3):
             z[i, 1 + j] = 0.0 if held else y[i, j]
         z[i, 4] = y[i, 3] * contact.rolls[i]
-    first = first_node(contact)
+    first = first_in_contact(contact, 0, last)
     for i in range(begin, first):
         for j in range(5):
             z[i, j] = 0.0
@@ -258,7 +250,7 @@ def find_solution(ends, contact, work):
     """
     x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
     count, per = contact.counts.nodes, unknowns(contact)
-    begin = first_node(contact)
+    begin = first_in_contact(contact, 0, contact.marks.shape[0] - 1)
     prepare_sweep(work.X, work.W, contact.sweep, begin, contact.z.shape[0] - 1)
     for k in range(count):
         i = contact.nodes[k]
@@ -401,12 +393,21 @@ def is_judged(numbers):
 
 
 @inner
+def knows_before(numbers, now):
+    """Whether the energy HAD before a try is known: it has been asked for, or is that where the last try has led."""
+    if numbers.begun != now and numbers.led == now:
+        numbers.had, numbers.balance, numbers.begun = numbers.has, numbers.tried_balance, now
+    return numbers.begun == now
+
+
+@inner
 def is_gain(contact, u, done, missed):
     """Whether a try from the energy HAD to HAS, on the way u (m), has put in so much that it is repeated in halves.
 
     done: J, work that accounts for it, which may be off by `missed`.
     """
     numbers = contact.numbers
+    numbers.largest = max(numbers.largest, numbers.had)
     most, gain = MOST_GAIN * numbers.largest, numbers.has - numbers.had - done
     gain = max(gain - missed, 0.0) if gain > 0.0 else min(gain + missed, 0.0)
     numbers.tried_balance = numbers.balance + gain
@@ -427,15 +428,9 @@ def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     numbers = contact.numbers
     if not is_judged(numbers):
         return False
-    if numbers.begun != clock.now:
-        if numbers.led == clock.now:
-            numbers.had, numbers.balance = numbers.has, numbers.tried_balance
-        else:
-            numbers.had = energy_without_weight(line, ends, contact, old, books.report[0])
-        numbers.begun = clock.now
-        numbers.largest = max(numbers.largest, numbers.had)
-    numbers.has = energy_without_weight(line, ends, contact, new, work.report)
-    numbers.led = clock.try_end
+    if not knows_before(numbers, clock.now):
+        numbers.had, numbers.begun = energy_without_weight(line, ends, contact, old, books.report[0]), clock.now
+    numbers.has, numbers.led = energy_without_weight(line, ends, contact, new, work.report), clock.try_end
     done, missed = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
     return is_gain(contact, work.u, done, missed)
 

@@ -561,3 +561,12 @@ def find_points(line, ends, contact, gone):
                 if contact.marks[i] == 0:
                     contact.marks[i], contact.nodes[counts.nodes] = 1, i
                     counts.nodes += 1
+
+
+@inner
+def first_in_contact(contact, first, n):
+    """The first of the n + 1 nodes of a line that is in contact; n + 1: none is.  first: where they begin there."""
+    for i in range(n + 1):
+        if contact.marks[first + i] != 0:
+            return i
+    return n + 1

@@ -34,6 +34,7 @@ from hybrid.kernels.contact.self_contact import (
     inner_product,
     is_gain,
     is_judged,
+    knows_before,
     length_of,
     load_ends,
     load_vector,
@@ -52,6 +53,7 @@ from hybrid.kernels.contact.self_contact_pairs import (
     SHARES,
     SLIP_WITHIN,
     WITHIN_LINE,
+    first_in_contact,
 )
 from hybrid.kernels.junctions.borders import (
     COUPLE,
@@ -268,13 +270,8 @@ def puts_energy_in(job, one):
     for k in range(job.lines.shape[0]):
         if read(job.tables[job.lines[k]]).reel != 0:  # what a winch does is not known here
             return False
-    if numbers.begun != clock.now:
-        if numbers.led == clock.now:
-            numbers.had, numbers.balance = numbers.has, numbers.tried_balance
-        else:
-            numbers.had = energy_of(job, one, False)
-        numbers.begun = clock.now
-        numbers.largest = max(numbers.largest, numbers.had)
+    if not knows_before(numbers, clock.now):
+        numbers.had, numbers.begun = energy_of(job, one, False), clock.now
     numbers.has, numbers.led = energy_of(job, one, True), clock.try_end
     done, missed = 0.0, 0.0
     if numbers.friction > 0.0:
@@ -324,23 +321,7 @@ class TouchingJob(NamedTuple):
 
 
 blank_touching_job = blanks(TouchingJob)
-
-
-def room_for_products() -> Floats:
-    """Columns of GMRES, with rotations, right-hand side and solution."""
-    return np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4))
-
-
 read_job = reader(blank_touching_job())
-
-
-@inner
-def first_in_contact(contact, first, n):
-    """The first of the n + 1 nodes of a line that is in contact; n + 1: none is.  first: where they begin there."""
-    for i in range(n + 1):
-        if contact.marks[first + i] != 0:
-            return i
-    return n + 1
 
 
 @inner
