@@ -261,9 +261,10 @@ MOST_FILES, SMALL_FILES, LONG_FILES = 342, 4, 0
 
 def test_files_are_as_long_as_a_subject() -> None:
     sizes = [file.read_text(encoding="utf-8").count("\n") for file in FILES if not file.name.startswith("__")]
-    assert len(FILES) <= MOST_FILES
-    assert sum(size < 100 for size in sizes) <= SMALL_FILES
-    assert sum(size > 700 for size in sizes) <= LONG_FILES
+    say = "a new file takes the place of one: join code to the file of its subject, or join two small files"
+    assert len(FILES) <= MOST_FILES, f"{len(FILES)} files, at most {MOST_FILES}; {say}"
+    assert sum(size < 100 for size in sizes) <= SMALL_FILES, f"files below 100 lines; {say}"
+    assert sum(size > 700 for size in sizes) <= LONG_FILES, "a file above 700 lines: it has two subjects"
 
 
 # Rules of writing, and in how many places each is broken: only less.

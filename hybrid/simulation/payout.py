@@ -135,6 +135,10 @@ class PayingOut:
         return length
 
     def _set_law(self, law: Floats) -> None:
+        """Rows of a law are t (s) and coefficients of x^6 to x^0, x = time since t; steps and outputs have its address.
+
+        Outputs that wait were made with the law before: they are written down first.
+        """
         self.law, self.reel = law, self.reel._replace(law=law)
         self.table.bind(reel=self.reel)
 
