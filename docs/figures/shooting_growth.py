@@ -25,7 +25,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.model.network import build_system
+from hybrid.model.network import build_network
 from hybrid.scene.root import Scene, in_full
 from hybrid.simulation.equilibrium import equilibrium_of
 
@@ -97,7 +97,7 @@ def one_march(scene: Scene) -> Slopes:
 def production(scene: Scene) -> Slopes:
     """The elimination along s; the clamp itself stands first."""
     network = in_full(scene)
-    model = build_system(network)
+    model = build_network(network)
     chords, s = equilibrium_of(network, model, 0.0).state.lines[0].e, model.models[0].line.s
     middle, slope = 0.5 * (s[1:] + s[:-1]), chords[:, 2] / np.linalg.norm(chords, axis=1)
     return np.concatenate([[0.0], middle]), np.concatenate([[SLOPE], slope])

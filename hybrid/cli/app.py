@@ -45,8 +45,16 @@ LOOP = "Symlink loop from"  # how Path.resolve begins to say so
 LESS = "fewer cells (mesh), fewer output.points, a larger output.every"
 
 
+# In the help commands stand as they are needed: a scene, its result, what else it may be asked, and other programs.
+ORDER = "run resume static plan view plot report export stats modes response seek sensitivity design study trade"
+ORDER += " import schema"
+
+
 class _Commands(typer.core.TyperGroup):
     """Help as plain text: the boxes of rich take half of its time."""
+
+    def list_commands(self, context: Any) -> list[str]:
+        return sorted(self.commands, key=ORDER.split().index)
 
     def format_commands(self, context: Any, formatter: Any) -> None:
         """Each command with the whole first sentence of its help."""
