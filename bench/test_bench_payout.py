@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.mesh import remesh
-from hybrid.simulation.remesh import NodeChanges
+from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_payout import RunPayout
 from hybrid.solve.network_steps import NetworkSteps
 from tests.simulation.test_payout import clamped, kicks

@@ -256,7 +256,7 @@ def test_one_line_is_no_other_case_than_several() -> None:
 
 
 # Files, those below 100 lines, and those above 700: only less.  What is small joins its subject.
-MOST_FILES, SMALL_FILES, LONG_FILES = 342, 4, 0
+MOST_FILES, SMALL_FILES, LONG_FILES = 300, 1, 0
 
 
 def test_files_are_as_long_as_a_subject() -> None:
@@ -273,8 +273,8 @@ BROKEN = {
     "name from the list of banned words": 0,
     "more than two constants in a line": 0,
     "constructor above 40 lines": 0,
-    "function above 60 lines": 7,
-    "fmt: skip": 339,
+    "function above 60 lines": 6,
+    "fmt: skip": 338,
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",

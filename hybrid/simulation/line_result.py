@@ -44,7 +44,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.diagnostics import Diagnostics, LineStep, Stop
 from hybrid.simulation.events import FASTEST, EventLog, borne_strain, energy_gains_text, note_laid, stretch_text
 from hybrid.simulation.lines_contact import LinesWatch, diameters, least_bending
-from hybrid.simulation.remesh import Around, HasPlane, NodeChanges
+from hybrid.simulation.remesh import Around, HasPlane
 from hybrid.simulation.result_file import Envelope, marked_places, marks_on
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.solve.contact import SelfContact
@@ -60,6 +60,7 @@ from hybrid.zones.manager import DomainManager
 if TYPE_CHECKING:
     from hybrid.simulation.cell_changes import CellChanges
     from hybrid.simulation.payout import PayingOut
+    from hybrid.simulation.payout_nodes import NodeChanges
 
 # Columns of the step log that runs to compare with keep: time, forces at both ends.
 FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]

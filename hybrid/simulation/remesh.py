@@ -1,17 +1,16 @@
-"""Other cells for a line of a run, and nodes that enter and leave it at a winch.
+"""Other cells for a line of a run.
 
 Changes need no help of Python's: they go to arrays with room for the most cells that there can be.
 
 Two sets of arrays, the sides, take turns: a change goes from one to the other (kernels.mesh.remesh), and the tables
 of the run get the numbers of the other one.  What Python has of the line is made anew when the run comes back
 (`sync`). A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes
-at a winch, where zones stay (`NodeChanges`).
+at a winch, where zones stay (simulation.payout_nodes).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
@@ -21,30 +20,10 @@ from hybrid.kernels.contact.self_distance import Itself, blank_itself, blank_its
 from hybrid.kernels.machine.binding import Packed, Room, Table, address
 from hybrid.kernels.mesh import remesh as f
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
-from hybrid.kernels.reel.payout import stand_still
-from hybrid.kernels.reel.payout_nodes import (
-    OF_REEL,
-    CarryJob,
-    NodeJob,
-    blank_line_job,
-    blank_node_job,
-    blank_node_planner,
-    book_change,
-    carry_node,
-    change_line,
-    fit_changed,
-    keep_reel,
-    make_line,
-    node_due,
-    plan_node,
-    renew_run,
-)
-from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.newton import NO_PUSH, workspace
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.report import REMEMBERS
 from hybrid.kernels.state.state import (
     NO_GRIP,
     NO_PEAK,
@@ -70,7 +49,7 @@ from hybrid.model.line import lines
 from hybrid.model.network import NetworkModel
 from hybrid.outputs.observation import Output
 from hybrid.simulation.lines_contact import LinesWatch
-from hybrid.simulation.result_file import Envelope, marks_on
+from hybrid.simulation.result_file import Envelope
 from hybrid.solve.contact import SelfContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
@@ -530,131 +509,3 @@ def copy_fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
     for name in old._fields:
         if name not in but:
             getattr(new, name)[:] = getattr(old, name)
-
-
-# --- nodes at a winch --------------------------------------------------------------------------
-
-SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
-
-
-class NodeChanges(Remesh):
-    """Nodes of a line of a run that enter and leave, where zones stay, with the solver that it has now."""
-
-    beside, most_waiting, per_node = ("line", "sea", "old", "new", "report", "reel", "X", "W"), 512, OF_REEL
-
-    def __init__(self, run: OfRun, number: int) -> None:
-        """Room for all; `adopt` before the first change."""
-        paying, model = run.lines[number].paying, run.model.models[number]
-        assert paying is not None
-        self._paying = paying
-        plan, reel, twice, damped = self._paying.plan, self._paying.reel, self._paying.solves_twice, self._paying.damped
-        most, extra = self._paying.most_cells, int((marks_on(model.line.s, run.lines[number].marked) != 0).sum())
-        super().__init__(run, number, most, extra, twice)
-        reels = Packed(
-            lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped), given=SHARED
-        )
-        self._reels = Room(reels, most), Room(reels, most)
-        # for what cells lack whose outputs wait; some MB, of which a run with few outputs touches little
-        self._lacks = np.empty(self.most_waiting * OF_REEL * (most + 1))
-        self._line_table = Table(blank_line_job())
-        self._whole = plan.whole_line(model.line, plan.held_as(model.cable))
-
-    def _key(self) -> tuple[Any, ...]:
-        """What the tables hold as it is."""
-        model = self.model
-        same = id(model.line.plane), id(model.ends), id(self._paying.reel.law), id(self._line.envelope)
-        return model.line.bits, bool(self.pushes[0].size), *same
-
-    @staticmethod
-    def may_change(run: OfRun, number: int) -> bool:
-        """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
-        model, line = run.model.models[number], run.lines[number]
-        stays = model.layout is None and line.paying is not None and not line.paying.ended
-        return stays and by_itself(run, number) and is_plain(model.line)
-
-    def change(self) -> None:
-        """A node enters or leaves now."""
-        f.change_cells(self._table.numbers)
-        self.sync()
-
-    # --- tables -------------------------------------------------------------------------------------
-
-    def _reel(self, k: int, cells: int) -> Reel:
-        now = self._paying.reel
-        found: Reel = self._reels[k].view(cells, **{name: getattr(now, name) for name in SHARED})
-        return found
-
-    def _beside_table(self) -> tuple[Table, Callable[[], Any]]:
-        return self._paying.table, blank_reel_job
-
-    def _in_beside(self, k: int, _: int, m: int) -> dict[str, Any]:
-        work = self._work_on(m)
-        return {
-            "line": self.line(k, m), "sea": self._sea_on(m), "old": self.state(k, 0, m), "new": self.state(k, 1, m),
-            "report": work.report, "reel": self._reel(k, m), "X": work.X, "W": work.W,
-        }  # fmt: skip
-
-    def _node_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
-        """What a change from n cells, in the arrays of side k, to m is bound to."""
-        model, to, before = self.model, 1 - k, self._books(k, n)
-        carry = CarryJob(
-            self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m), self._reel(k, n),
-            self._reel(to, m), self._run.loop.clock, before.tension, self._paying.plan.nodes,
-        )  # fmt: skip
-        job = NodeJob(
-            carry, self._whole, model.ends.values, self._sea_on(m), self._work_on(m), self.state(to, 1, m),
-            before, self._books(to, m), self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m),
-            self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale,
-        )  # fmt: skip
-        return job._asdict()
-
-    def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
-        envelope, plan, most = self._line.envelope, self._paying.plan, self.most + 2
-        way = slice(None, None, 1 if plan.side else -1)
-        borne = np.ascontiguousarray(1.0 + plan.cable.max_strain[way])
-        self._along = borne, np.ascontiguousarray(plan.cable.outer_diameter[way]), envelope.start, envelope.bounds
-        self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
-        nodes = shaped(blank_node_job, self._node_job, *PAIRS)
-        # the table of `carry_node` begins that of the others
-        parts = [Part(x, 0) for x in (change_line, carry_node, fit_changed, book_change, renew_run)]
-        self._calls.stand = stand_still.address(self._paying.table.numbers)
-        return [nodes], parts, 2
-
-    def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
-        tables = []
-        for k in (0, 1):
-            tables.append(Table(blank_node_planner))
-            reel = self._reel(k, self.most)
-            tables[-1].bind(at=self._at, reel=reel, winch=reel.winch, room=self._lacks)
-        return (node_due, plan_node, keep_reel), tables, self._lacks.size
-
-    def _copy_beside(self, n: int) -> None:
-        copy_fields(self._paying.reel, self._reel(0, n), SHARED)
-
-    def _model_of(self, line: Line, sea: Sea) -> Model:
-        model, paying, length = self.model, self._paying, float(line.s[-1] - line.s[0])
-        paying.count, paying.reel = self.cells - paying.rides, self._reel(self.side, self.cells)
-        zones = paying.plan.zones_of(length)
-        return replace(model, line=line, zones=zones, sea=model.sea.with_values(sea), length=length)
-
-    # --- outputs that wait --------------------------------------------------------------------------
-
-    def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
-        """With what its cells lacked, which is kept."""
-        k, paying, model, end = self.side, self._paying, self.model, begin + OF_REEL * cells
-        line = lines(cells, bits=model.line.bits, plane=model.line.plane, **NO_LAWS)
-        reel = self._reel(1 - k, cells)
-        reel.numbers[:] = paying.reel.numbers
-        self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)
-        make_line(self._line_table.numbers)
-        reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = self._lacks[begin:end].reshape(OF_REEL, cells)
-        return paying.outputs_in(line, reel, batch), end
-
-    def _outputs_now(self, batch: Batch) -> list[Output]:
-        return self._paying.outputs_of_now(self.model.line, batch)
-
-
-def is_plain(line: Line) -> bool:
-    """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
-    laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
-    return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS

@@ -27,7 +27,7 @@ from hybrid.model.payout import FEWEST_CELLS
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.parts import Part
 from hybrid.simulation.payout import Before, PayingOut
-from hybrid.simulation.remesh import NodeChanges
+from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps

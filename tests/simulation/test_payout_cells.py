@@ -11,7 +11,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import zones_over_time
 from hybrid.simulation.payout import PayingOut
-from hybrid.simulation.remesh import NodeChanges
+from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine
 from tests.scenes import clamped_at, pinned_at
 from tests.simulation.test_payout import G, hanging
