@@ -201,7 +201,7 @@ def test_what_constants_move(monkeypatch: pytest.MonkeyPatch) -> None:
         places = {(str(sys.modules[x.module].__file__), x.name) for x in at}
         which = [x for x in known if places & x[-1]]
         what = ""
-        for cpu, name, data, rest, before, _ in which:
+        for _cpu, name, data, rest, before, _ in which:
             for factor in (2, 0.5):
                 value = type(constant.value)(constant.value * factor)
                 what = what or moved(before, tried(constant, at, value, data, rest))
