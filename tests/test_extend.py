@@ -114,5 +114,5 @@ def test_there_is_a_proof_for_every_seam() -> None:
     assert text[: text.index("```diff")].count("```python") == UNCHANGED
     sections = {part.partition("\n")[0]: part for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]}
     for seam, part in sections.items():
-        if seam != "Kernels":
+        if seam not in ("Kernels", "Before a change is merged"):
             assert "assert " in part, f"{seam} has no proof"

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import hybrid
-from hybrid.cli.app import session
+from hybrid.cli.app import ORDER, session
 from hybrid.kernels.machine.cache import CacheWarning
 from tests.scenes import cable_scene, pinned_at
 
@@ -121,6 +121,13 @@ def test_python_runs_the_package_as_the_command(
 
 
 @pytest.mark.long
+def test_the_help_names_every_command() -> None:
+    from hybrid.cli.commands import app
+
+    named = {x.name or x.callback.__name__ for x in app.registered_commands if x.callback}
+    assert named == {*ORDER.split()}
+
+
 def test_version_and_help() -> None:
     named, code = call("--version")[0].splitlines()
     assert named == f"hybrid {hybrid.__version__}" and code.startswith(

@@ -173,7 +173,7 @@ def test_shells_complete_commands(capsys: pytest.CaptureFixture[str], monkeypatc
         monkeypatch.setenv(name, value)
     with pytest.raises(SystemExit):
         main([])
-    assert capsys.readouterr().out.split() == ["report", "response", "resume"]
+    assert capsys.readouterr().out.split() == ["resume", "report", "response"]
 
 
 def test_without_a_terminal_there_is_a_line_every_few_seconds() -> None:
