@@ -11,6 +11,7 @@ that none of these scenes needs, a price of time or memory, or one that buys not
 from __future__ import annotations
 
 import ast
+import faulthandler
 import math
 import sys
 import time as clock
@@ -181,6 +182,7 @@ def tried(constant: Constant, uses: list[Uses], value: float, data: dict[str, An
 
 def test_what_constants_move(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(EXAMPLES)  # files that scenes name
+    faulthandler.cancel_dump_traceback_later()  # no other test takes so long
     known = []
     for name, data, rest in scenes():
         facts(data, rest)  # compiles

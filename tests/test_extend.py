@@ -89,8 +89,10 @@ assert pytest.main(["-q", "-n", "0", "-p", "no:cacheprovider", {walk!r}]) == 0, 
 """
 
 
-# Read for two kinds of arguments each, which takes little: bits and truths, numbers of cells and kinds of them.
+# Read for two kinds of arguments each, which takes little: bits and truths, numbers of cells and kinds of them; blocks of
+# a line by itself, and of joined lines with columns beside them.
 TWICE = {"hybrid.kernels.mesh.remesh.fill_element", "hybrid.kernels.mesh.cell_changes.begin_anew"}
+TWICE |= {"hybrid.kernels.algebra.block_elimination.substitute"}
 # Read for steps, which have a state and books, and for outputs, whose tables are both: 4 s of the first use of outputs.
 TWICE |= {"hybrid.kernels.watch.extremes.node_pressure", "hybrid.kernels.laws.element.frames_at"}
 SIDES = "hybrid.kernels.watch.sides."

@@ -306,7 +306,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
 def test_an_equilibrium_in_a_plane_asks_for_no_solver_in_space() -> None:
     """Whose compilation takes longest; in a process of its own, where nothing is compiled or loaded yet."""
     code = "import hybrid, json, sys; from hybrid.kernels.run import newton; hybrid.static(json.loads(sys.argv[1])); "
-    code += "print(len(entry.in_plane.signatures), len(entry.in_space.signatures))"
+    code += "print(len(newton.in_plane.signatures), len(newton.in_space.signatures))"
     done = subprocess.run(
         [sys.executable, "-c", code, json.dumps(KINDS["rod in a plane"])], capture_output=True, text=True, check=True
     )
