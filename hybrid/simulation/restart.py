@@ -187,7 +187,7 @@ def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
     if isinstance(manager, dict):
         manager = saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | _renamed(manager)
         for name in ("ratios", "seen"):
-            if isinstance(found := manager.get(name), np.ndarray):
+            if isinstance(found := manager.get(name), np.ndarray) and found.ndim == 2 and len(found) < len(CRITERIA):
                 manager[name] = np.pad(found, ((0, len(CRITERIA) - len(found)), (0, 0)))
     return saved
 

@@ -390,6 +390,8 @@ def test_zones_of_an_older_checkpoint() -> None:
     assert zoning_of_today({"manager": own, "following": rest})["manager"]["largest"].tolist() == [1, 1, 1, 1]
     fewer = zoning_of_today({"manager": {x: np.ones((len(CRITERIA) - 2, 3)) for x in ("ratios", "seen")}})["manager"]
     assert all(np.sum(fewer[x], axis=1).tolist() == [3.0] * (len(CRITERIA) - 2) + [0.0] * 2 for x in ("ratios", "seen"))
+    later = np.ones((len(CRITERIA) + 1, 3))  # of a later program, which is refused by its shape
+    assert zoning_of_today({"manager": {"ratios": later}})["manager"]["ratios"] is later
     names = {"haste": "ramp_factor", "calm_since": "below_since", "calmed": "release_cause", "patience": "wait_factor"}
     assert (
         zoning_of_today({"manager": {x: x for x in names}})["manager"].items()
