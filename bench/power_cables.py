@@ -24,13 +24,18 @@ PARENTS = ("twin_of", "mesh_of", "rest_of")
 
 
 class Answer(NamedTuple):
-    """Tension at the start (N; of a motion at all times), cells, events, refusal, CPU time (s)."""
+    """Tension at the start (N; of a motion at all times), cells, events, refusal, CPU time (s).
+
+    held: N, of the weight in water what the ends hold; least: N, the least tension.
+    """
 
     tension: Any
     cells: int
     events: tuple[str, ...]
     refused: str
     cpu: float
+    held: float = np.nan
+    least: float = np.nan
 
 
 def rows() -> dict[str, dict[str, Any]]:
@@ -91,7 +96,9 @@ def answer_of(scene: dict[str, Any]) -> Answer:
         return Answer(np.nan, 0, (), str(error).splitlines()[0], time.process_time() - begin)
     cpu = time.process_time() - begin
     tension = np.linalg.norm(found.reaction_start, axis=1)
-    return Answer(tension, found.mesh[0].s.size - 1, tuple(sorted({x.kind for x in found.events})), "", cpu)
+    held, least = found.reaction_start[-1, 2] + found.reaction_end[-1, 2], found.tension[-1].min()
+    events = tuple(sorted({x.kind for x in found.events}))
+    return Answer(tension, found.mesh[0].s.size - 1, events, "", cpu, float(held), float(least))
 
 
 def bound_of(row: dict[str, Any], tension: float) -> tuple[float, float]:
@@ -104,10 +111,22 @@ def bound_of(row: dict[str, Any], tension: float) -> tuple[float, float]:
     return np.nan, np.inf
 
 
-def twin_bound(row: dict[str, Any]) -> tuple[str, float]:
-    """The case that a case is a twin of, and how far it may be from that; "": none.
+def by_friction(row: dict[str, Any], answer: Answer) -> float:
+    """What the friction of a bed may change of the tension at the start, as a part of it: that of all that lies there."""
+    friction = (row["bed"] or {}).get("friction", 0.0)
+    if not friction or not answer.cells:
+        return 0.0
+    weight = 0.0
+    for kind, length, _ in row["sections"]:
+        diameter, mass = row["types"][kind][:2]
+        weight += 9.80665 * length * (mass - 1025.0 * np.pi / 4.0 * diameter**2)
+    return float(friction * max(weight - answer.held, 0.0) / answer.tension[-1])
 
-    A bed of depths may differ from a plane one, and friction is left out: they are as near.
+
+def twin_bound(row: dict[str, Any]) -> tuple[str, float]:
+    """The case that a case is a twin of, and how far it may be from that without friction; "": none.
+
+    A bed of depths may differ from a plane one: they are as near.
     """
     for key, bound in zip(PARENTS, (MOVED, FINER, AT_REST), strict=True):
         if row.get(key):
@@ -148,8 +167,8 @@ class Solved(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """Whether a line in compression was solved without a word."""
-        return not self.admissible and bool(self.answer.cells) and not self.answer.events
+        """Whether a line in compression was solved without a word; with friction another program's may be where ours is not."""
+        return not self.admissible and self.answer.least < 0.0 and not self.answer.events
 
     @property
     def judged_by_root(self) -> bool:
@@ -168,9 +187,15 @@ def solve_all() -> dict[str, Solved]:
             answer, other = answer_of(scene_of(row)), None
         tension = float(answer.tension[-1]) if answer.cells else np.nan
         off, most = bound_of(row, tension)
-        apart = np.nan
+        apart, good = np.nan, bool(answer.cells) and not off > most
         if other is not None and answer.cells and other.cells:
-            apart = float(np.abs(answer.tension / other.tension[-1] - 1.0).max())
-        good = bool(answer.cells) and not off > most and not apart > bound
+            twin, held = answer, by_friction(row, answer)
+            if held and row.get(
+                "twin_of"
+            ):  # a twin of a line without friction, and as near to it as friction lets it be
+                twin = answer_of(scene_of(row) | {"initial": {"kind": "equilibrium", "friction": "neglected"}})
+                good &= not abs(answer.tension[-1] / twin.tension[-1] - 1.0) > held
+            apart = float(np.abs(twin.tension / other.tension[-1] - 1.0).max())
+            good &= not apart > bound
         found[name] = Solved(row, answer, tension, off, apart, good)
     return found

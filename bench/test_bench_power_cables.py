@@ -7,7 +7,8 @@ lazy, steep and lazy S waves, hung lines, slopes, rough beds, currents, friction
 their data.  Each is computed as an engineer would: the data, and nothing else given.  The tension at the start is
 compared with the nearest catenary between the ends without bending (15 %, where sqrt(EI/T) is below a twentieth of the
 length), or with the value of OrcaFlex (1 %).  Twins agree with what they are twins of: moved or turned to 1e-6, on a
-finer mesh to 0.5 %, in a motion from rest to 1e-5 of the equilibrium on its mesh.  A line that is too long for its span, or compressed, is refused or said.
+finer mesh to 0.5 %, in a motion from rest to 1e-5 of the equilibrium on its mesh, with friction to that of what lies
+on the bed.  A line that is too long for its span, or compressed, is refused or said.
 """
 
 from __future__ import annotations

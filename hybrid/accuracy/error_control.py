@@ -133,18 +133,19 @@ class ErrorController:
             return False
         if not any([x.finds_no_rest(error) for x in self.lines.values()]):
             raise error
-        self.first = self.next = self._halved(resolution)
+        self.first = self.next = self._halved(resolution, steps=False)
         return True
 
     def _judge_first(self, result: Samples, own: int) -> Samples | None:
-        """Compare a first result with coarser runs; the result itself where one of shorter cells follows.
+        """Compare a first result with coarser runs; the result itself where a finer one follows, as these fail.
 
         own: its number among the runs.
         """
         if not self._is_compared:
             self._compare(self.first or _finely(result))
-        finer = self._halved(_finely(result))
-        if not self._is_compared and any(x.is_too_coarse for x in self.lines.values()) and self._allows(result, finer):
+        cells, steps = (any(x) for x in zip(*(x.halves for x in self.lines.values()), strict=True))
+        finer = self._halved(_finely(result), steps)
+        if not self._is_compared and (cells or steps) and self._allows(result, finer):
             self.decide(True)  # it may be beside the one before
             for line in self.lines.values():
                 line.halve()
@@ -172,10 +173,11 @@ class ErrorController:
 
     # --- how finely -----------------------------------------------------------------------------
 
-    def _halved(self, now: NetworkResolution) -> NetworkResolution:
-        """Cells half as long, of lines that leave their mesh open."""
+    def _halved(self, now: NetworkResolution, steps: bool) -> NetworkResolution:
+        """Cells half as long, of lines that leave their mesh open; steps: whether those are, too."""
+        finer, longer = 1.0 / COARSER, 1.0 / COARSER if steps else 1.0
         return NetworkResolution(
-            {name: x.coarser(0.5) if self.lines[name].free.mesh else x for name, x in now.lines.items()}
+            {name: x.coarser(finer if self.lines[name].free.mesh else 1.0, longer) for name, x in now.lines.items()}
         )
 
     def _finer(self, now: NetworkResolution, wanted: Mapping[str, Resolution]) -> NetworkResolution:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -48,7 +48,7 @@ from hybrid.store.stored_rows import MissingRows
 STALLED = 0.8
 # Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
 MOST_CPU = 600.0
-# Results of cells half as long, at most, where no equilibrium is found on those of the runs to compare with.
+# Results of cells half as long, at most, where no equilibrium or motion is found on those of the runs to compare with.
 MOST_HALVINGS = 2
 # Cells from which on an equilibrium is not made finer: it takes seconds.  No clock, by which the first scene of a run,
 # while code is compiled, and one beside others would be less accurate than the same again.
@@ -92,7 +92,7 @@ class LineErrors:
     excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
-    _at_rest: bool = False  # whether the run to compare with that has failed did so before it moved
+    _failed: Literal["", "at rest", "in motion"] = ""  # how a run to compare with has failed last
     _slow_from: list[float] | None = None  # cells and steps of the first result, where errors fell slowly until then
     _every: int = 1  # outputs to one of which the statistics are
     own_notes: list[tuple[str, str]] = field(default_factory=list)
@@ -156,21 +156,23 @@ class LineErrors:
         return again
 
     @property
-    def is_too_coarse(self) -> bool:
-        """Whether a result of cells half as long follows, because those of the runs to compare with are too long.
+    def halves(self) -> tuple[bool, bool]:
+        """Whether cells, and steps, of the next result are half as long, as a run to compare with has failed.
 
-        So they are where no equilibrium is found on them; a motion that fails may have other reasons.
+        A motion that fails may do so by either; the runs to compare with are then as fine as the result before.
         """
-        return self._at_rest and self.asked is not None and self.free.mesh and self._judged < MOST_HALVINGS
+        if self.asked is None or self._judged >= MOST_HALVINGS or not self._failed:
+            return False, False
+        return self.free.mesh, self.free.steps and self._failed == "in motion"
 
     def halve(self) -> None:
-        """Forget that errors are not known: a result of cells half as long follows."""
+        """Forget that errors are not known: a finer result follows."""
         self._judged += 1
         self.own_notes.pop()
 
     def lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
         """Note that errors are not known, as such a run has failed."""
-        self._at_rest = error.t is None
+        self._failed = "at rest" if error.t is None else "in motion"
         text = f"error not known: a {what} failed: {str(error).splitlines()[0]}"
         self.own_notes.append(("no error figure", text))
 

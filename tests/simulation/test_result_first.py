@@ -235,6 +235,30 @@ def test_a_comparison_that_fails_leaves_the_result(tmp_path: Path, monkeypatch: 
         assert event.text.startswith("error not known: a coarser run to compare with failed") and result.done
 
 
+@pytest.mark.parametrize("scene", [asked("1%"), two_lines("1%")], ids=["one", "several"])
+def test_a_comparison_that_fails_in_motion_is_of_a_finer_result(
+    scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cells and steps half as long, so that the next is as fine as the result that came to its end."""
+    record, sample, finely = Case.record, Case.sample, list[Any]()
+
+    def recorded(self: Case, resolution: Any, *more: Any) -> Any:
+        finely.append(resolution.one)
+        return record(self, resolution, *more)
+
+    def failing(self: Case, resolution: Any, *more: Any, **named: Any) -> Any:
+        if len(finely) == 1:
+            raise ComputationError(Outcome.SINGULAR, 1.0, 0.0)
+        return sample(self, resolution, *more, **named)
+
+    monkeypatch.setattr(Case, "record", recorded)
+    monkeypatch.setattr(Case, "sample", failing)
+    with hybrid.run(scene, tmp_path / "run.h5") as result:
+        first, second = finely[:2]
+        assert second.fineness == 2.0 * first.fineness and second.step == 0.5 * first.step
+        assert "no error figure" not in {x.kind for x in result.events} and result.done
+
+
 def test_an_equilibrium_is_there_before_its_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sample = CaseAtRest.sample
 
