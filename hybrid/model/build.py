@@ -202,6 +202,13 @@ class Model:
         return self.layout.finest if self.payout is None else self.payout.first_layout
 
     @property
+    def most_cells(self) -> int:
+        """Cells that there may be, whatever zones, the curvature or a winch make of the line."""
+        if self.layout is not None:
+            return int(self.layout.starts[-1])
+        return self.cells if self.payout is None else max(self.cells, self.payout.most_cells)
+
+    @property
     def cells(self) -> int:
         return int(self.line.h.size)
 

@@ -99,6 +99,11 @@ class PayoutPlan:
         n = int(np.searchsorted(self.nodes, begins))
         return n if begins - self.nodes[n - 1] > LEAVES * self.cell(n - 1) else n - 1
 
+    @property
+    def most_cells(self) -> int:
+        """Cells that there may be, of a line whose zones stay."""
+        return int(self.nodes.size) + self.layer.size - 3
+
     def cells(self, length: float) -> int:
         """Cells of a line of that length, m, with those of nodes that ride with the fairlead."""
         return self.count(length) + self.layer.size - 1

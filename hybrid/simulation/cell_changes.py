@@ -32,7 +32,7 @@ from hybrid.model.build import Model
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import kinds_of
 from hybrid.outputs.observation import Output, outputs_in
-from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
+from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
 from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching
 from hybrid.zones.manager import OF_BASE, Change, all_zones
@@ -72,7 +72,7 @@ class CellChanges(Remesh):
         """Room for all; `adopt` before the first change."""
         model, layout = run.model.models[number], run.model.models[number].zoned
         self._switching, self._marked = switching, marks_on(layout.base, run.lines[number].marked)
-        super().__init__(run, number, int(layout.starts[-1]), int((self._marked != 0).sum()))
+        super().__init__(run, number, int((self._marked != 0).sum()))
         base, most = layout.rod.size, self.most
         self._starts, self._finest = layout.starts, layout.finest.nodes
         self._piece = model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
@@ -97,7 +97,7 @@ class CellChanges(Remesh):
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
         """Whether cells of a line can change so in a run whose solver is attached."""
         paid = any(x.paying is not None for x in run.lines)
-        if not switching.zones.clock.share > 0.0 or paid or not by_itself(run, number):
+        if not switching.zones.clock.share > 0.0 or paid or not steps_alone(run, number):
             return False
         model = run.model.models[number]
         plain = carries_all(model, switching) and not model.line.bits & REMEMBERS

@@ -215,12 +215,7 @@ class LineResult:
     @property
     def sample_size(self) -> int:
         """Numbers of an output of the line, of the most cells that it may have."""
-        cells, layout = self.model.line.h.size, self.model.layout
-        if layout is not None:
-            cells = int(layout.starts[-1])
-        elif self.paying is not None:
-            cells = max(cells, self.paying.most_cells)
-        return self._sample_size(cells)
+        return self._sample_size(self.model.most_cells)
 
     def _sample_size(self, cells: int) -> int:
         line, touches = self.model.line, self.books.touch.size > 0

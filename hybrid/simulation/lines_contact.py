@@ -13,6 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.contact.lines_distance import (
+    AT,
+    HAVE_MET,
+    MET,
+    MOVED,
+    NEAR,
+    OTHER,
+    ROOM,
+    TIME,
+    blank_lines_job,
+    watch_lines,
+)
 from hybrid.kernels.contact.self_contact_law import INNER, OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import (
@@ -28,18 +40,6 @@ from hybrid.kernels.contact.self_distance import (
     blank_itself,
     blank_itself_job,
     watch_itself,
-)
-from hybrid.kernels.junctions.lines_distance import (
-    AT,
-    HAVE_MET,
-    MET,
-    MOVED,
-    NEAR,
-    OTHER,
-    ROOM,
-    TIME,
-    blank_lines_job,
-    watch_lines,
 )
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.books import Clock, Counts
@@ -482,15 +482,27 @@ class LinesWatch:
         a, c = pairs.T
         self._pairs = np.column_stack([a, c, known[a, c], may[a, c], np.zeros_like(a)])
         self._room = np.zeros((len(self._pairs), ROOM))
-        width = [diameters(x) for x in model.models]
-        begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
+        most = [x.most_cells for x in model.models]
+        width, begins = [np.zeros(x) for x in most], np.append(0, np.cumsum(most)[:-1]).astype(np.int64)
+        for row, x in zip(width, model.models, strict=True):
+            row[: x.cells] = diameters(x)
         widest = max((float(x.max()) for x in width), default=0.0)
         self.joined = _joined_by_place(network, widest)
         self._bound = {
             "joined": self.joined, "begins": begins, "width": np.concatenate(width),
             "clock": clock, "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
         }  # fmt: skip
-        self._jobs = Table(blank_lines_job), Table(blank_lines_job)
+        self._most, self._jobs = most, (Table(blank_lines_job), Table(blank_lines_job))
+
+    def width_of(self, number: int) -> Floats:
+        """Diameters (M,) m of the cells of a line, with room for the most that there may be."""
+        begin, width = int(self._bound["begins"][number]), self._bound["width"]
+        return np.asarray(width[begin : begin + self._most[number]])
+
+    @property
+    def distances(self) -> dict[str, np.ndarray]:
+        """Pairs of lines, and how far apart they are, as kernels.mesh.remesh.RemeshJob has them."""
+        return {"pairs": self._pairs, "room": self._room}
 
     @property
     def is_needed(self) -> bool:

@@ -163,11 +163,6 @@ class PayingOut:
         return self.plan.layer.size - 1
 
     @property
-    def most_cells(self) -> int:
-        """Cells that there may be, of a line whose zones stay."""
-        return int(self.plan.nodes.size) - 2 + self.rides
-
-    @property
     def solves_twice(self) -> bool:
         """Whether a winch holds a tension at the start, or at a clamp: an iteration takes another right-hand side."""
         return self.holds_tension and (not self.plan.side or self.rides > 0)

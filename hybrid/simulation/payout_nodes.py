@@ -34,7 +34,7 @@ from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.line import lines
 from hybrid.outputs.observation import Output
-from hybrid.simulation.remesh import NO_LAWS, PAIRS, OfRun, Part, Remesh, Shaped, by_itself, copy_fields, shaped
+from hybrid.simulation.remesh import NO_LAWS, PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
 from hybrid.simulation.result_file import marks_on
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
@@ -51,14 +51,14 @@ class NodeChanges(Remesh):
         assert paying is not None
         self._paying = paying
         plan, reel, twice, damped = self._paying.plan, self._paying.reel, self._paying.solves_twice, self._paying.damped
-        most, extra = self._paying.most_cells, int((marks_on(model.line.s, run.lines[number].marked) != 0).sum())
-        super().__init__(run, number, most, extra, twice)
+        extra = int((marks_on(model.line.s, run.lines[number].marked) != 0).sum())
+        super().__init__(run, number, extra, twice)
         reels = Packed(
             lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped), given=SHARED
         )
-        self._reels = Room(reels, most), Room(reels, most)
+        self._reels = Room(reels, self.most), Room(reels, self.most)
         # for what cells lack whose outputs wait; some MB, of which a run with few outputs touches little
-        self._lacks = np.empty(self.most_waiting * OF_REEL * (most + 1))
+        self._lacks = np.empty(self.most_waiting * OF_REEL * (self.most + 1))
         self._line_table = Table(blank_line_job())
         self._whole = plan.whole_line(model.line, plan.held_as(model.cable))
 
@@ -73,7 +73,7 @@ class NodeChanges(Remesh):
         """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
         model, line = run.model.models[number], run.lines[number]
         stays = model.layout is None and line.paying is not None and not line.paying.ended
-        return stays and by_itself(run, number) and is_plain(model.line)
+        return stays and steps_alone(run, number) and is_plain(model.line)
 
     def change(self) -> None:
         """A node enters or leaves now."""

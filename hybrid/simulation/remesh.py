@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
+from hybrid.kernels.contact.lines_distance import ROOM, WATCHED
 from hybrid.kernels.contact.self_distance import Itself, blank_itself, blank_itself_job, boxes_of
 from hybrid.kernels.machine.binding import Packed, Room, Table, address
 from hybrid.kernels.mesh import remesh as f
 from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
 from hybrid.kernels.run.network import begin_line
-from hybrid.kernels.run.newton import NO_PUSH, workspace
+from hybrid.kernels.run.newton import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import (
@@ -130,13 +131,19 @@ def ends_alone(batches: Sequence[Batch]) -> Batch:
     return Batch(**{name: np.concatenate(x) for name, x in own.items()})
 
 
-def by_itself(run: OfRun, number: int) -> bool:
-    """Whether nothing but its own steps knows of the cells of a line, in a run whose solver is attached."""
-    line = run.lines[number]
-    watch = line.watched_by
-    watched = watch is not None and watch.is_needed
-    alone = number in run.solver.lone and not run.solver.mixes and not watched
-    return alone and line.contact is None
+def steps_alone(run: OfRun, number: int) -> bool:
+    """Whether nothing but steps and its watches know of the cells of a line, in a run whose solver is attached.
+
+    Frames of ends that turn with a body are not of the state alone.
+    """
+    solver = run.solver
+    beside = solver.mixes or solver.touches(number) or solver.turns_with(number)
+    return run.lines[number].contact is None and not beside
+
+
+def watch_beside(line: OfLine) -> LinesWatch | None:
+    """What looks how near a line comes to others; None: nothing does."""
+    return line.watched_by if line.watched_by is not None and line.watched_by.is_needed else None
 
 
 # What a line that changes so has not, of its fields and of those of its state: `Remesh` is not asked for one that has.
@@ -231,24 +238,26 @@ class Remesh:
     most_waiting = 0  # lines whose outputs may wait
     per_node = 0  # numbers of a node that are kept for them, at most
 
-    def __init__(self, run: OfRun, number: int, most: int, marked: int, twice: bool = False) -> None:
-        """Room for most cells; `adopt` before the first change.
+    def __init__(self, run: OfRun, number: int, marked: int, twice: bool = False) -> None:
+        """Room for the most cells; `adopt` before the first change.
 
         marked: nodes beside which extremes are kept on both sides; twice: as of `workspace`.
         """
         self._run, self._number, self._line, self._solver = run, number, run.lines[number], run.solver
-        # of steps of the line by itself, and of those of all lines by their parity
-        self._alone, self._even, self._odd = run.solver.tables_by_itself(number)
-        self._limits, self.most, self._fixed_to = run.solver.limits_by_itself(number), most, self._key()
+        self._alone, self._pairs = run.solver.tables_beside(number)
+        self._limits, self._fixed_to = run.solver.limits_by_itself(number), self._key()
+        self.most = most = self.model.most_cells
         kept, pushes = Packed(partial(blank_kept, extra=marked), given=REST_OF_BOOKS), Packed(blank_pushes)
         self._lines = Room(lines, most), Room(lines, most)
         self._states = tuple((Room(states, most), Room(states, most)) for _ in range(2))
         self._pushes, self._kept = (Room(pushes, most), Room(pushes, most)), (Room(kept, most), Room(kept, most))
         self._sea = Room(seas, most)
-        self._work = Room(Packed(partial(workspace, keep=twice), given=("torsion",)), most)
+        self._work = Room(Packed(run.solver.room_beside(number, twice), given=("torsion",)), most)
         self._base = np.zeros(self._line.books.base.size, np.int64)
         self._watch_table = self._line.watch_table  # None: nobody watches how near the line comes to itself
-        self._itself: Itself = blank_itself(np.zeros(most))
+        self._watch = watch_beside(self._line)
+        width = np.zeros(most) if self._watch is None else self._watch.width_of(number)
+        self._itself: Itself = blank_itself(width)._replace(width=width)
         self._calls, self._at, self._numbers = f.RemeshCalls(), f.RemeshPlaces(), np.zeros(f.NUMBERS)
         self._waiting = np.zeros((self.most_waiting, 3), np.int64)
         self._table = Table(f.blank_remesh_job)
@@ -323,7 +332,7 @@ class Remesh:
     def fits(self) -> bool:
         """Whether the line is solved by what the arrays were made for."""
         same = self._solver is self._run.solver and self._line.watch_table is self._watch_table
-        return bool(same and self._fixed_to == self._key())
+        return bool(same and self._watch is watch_beside(self._line) and self._fixed_to == self._key())
 
     @property
     def job(self) -> np.ndarray:
@@ -366,8 +375,9 @@ class Remesh:
         return found
 
     def _width(self, cells: int) -> Floats:
-        """Diameters of cells; none where nobody watches whether the line meets itself."""
-        return self._itself.width[: cells if self._watch_table is not None else 0]
+        """Diameters of cells; none where nobody watches whether the line meets itself or others."""
+        watched = self._watch_table is not None or self._watch is not None
+        return self._itself.width[: cells if watched else 0]
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -398,7 +408,15 @@ class Remesh:
             "itself": np.zeros(0, np.int64),
             "itself_places": np.zeros(0, np.int64),
             "in_itself": np.zeros((2, 3, 0), np.int64),
+            "even_joined": np.zeros(0, np.int64),
+            "odd_joined": np.zeros(0, np.int64),
+            "pairs": np.zeros((0, WATCHED), np.int64),
+            "room": np.zeros((0, ROOM)),
         }
+        if self._watch is not None:
+            numbers |= self._watch.distances
+        if len(self._pairs) > 1:
+            numbers |= dict(zip(("even_joined", "odd_joined"), (x.numbers for x in self._pairs[1]), strict=True))
         of_itself: list[Shaped] = []
         if self._watch_table is not None:
             of_itself = shaped(blank_itself_job, self._in_itself, *BOTH)
@@ -416,11 +434,11 @@ class Remesh:
             parts=np.array(calls, np.int64), change=np.zeros(ends[-1], np.int64),
             changed=np.array([np.concatenate([x[pair].numbers for x in change], axis=1) for pair in range(len(PAIRS))]),
             run=self._alone.numbers, run_places=in_run, in_run=np.array([x.numbers[:, in_run] for x in of_run]),
-            even=self._even.numbers, odd=self._odd.numbers,
+            even=self._pairs[0][0].numbers, odd=self._pairs[0][1].numbers,
             in_odd=np.array([x.numbers[:, in_run] for x in of_odd]), beside=beside.numbers, beside_places=in_beside,
             in_beside=np.array([x.numbers[:, in_beside] for x in of_beside]), waiting=self._waiting, **numbers,
         )  # fmt: skip
-        at.task, at.per_node = self._alone.part("task").start, self.per_node
+        at.task, at.per_node, at.number = self._alone.part("task").start, self.per_node, self._number
         for name, kernel in (("due", due), ("plan", plan), ("keep", keep)):
             setattr(self._calls, name, kernel.address(planners[0].numbers))
         for name, kernel in (("before_forces", before_forces), ("after_forces", after_forces), ("books", begin_line)):
@@ -474,8 +492,10 @@ class Remesh:
         was, now_ = pushes = self._push(k, 0, n), self._push(k, 1, n)
         if self._line.plane is not None:
             self._line.plane.pushes = pushes
-        for table, (before, after) in ((self._alone, states), (self._even, states), (self._odd, (new, old))):
-            table.hold(line=line, sea=sea, old=before, new=after, was=was, now=now_, work=work, books=books)
+        of_even = [self._alone, *(even for even, _ in self._pairs)]
+        for tables, (before, after) in ((of_even, states), ([odd for _, odd in self._pairs], (new, old))):
+            for table in tables:
+                table.hold(line=line, sea=sea, old=before, new=after, was=was, now=now_, work=work, books=books)
         self._beside_table()[0].hold(**self._in_beside(k, n, n))
         if self._watch_table is not None:
             itself = self._itself._replace(width=self._width(n), tree=self._itself.tree[: boxes_of(n)])

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.contact.lines_distance import JOINT
 from hybrid.kernels.contact.self_contact_law import OUTER
-from hybrid.kernels.junctions.lines_distance import JOINT
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line

@@ -506,7 +506,7 @@ class SharedContact(ContactBooks):
         return {**saved, "grips": _shifted_grips(saved, shift), "meetings": meetings} | now
 
     def attach(
-        self, numbers: NDArray[np.int64], joints: NDArray[np.int64], books: Sequence[Books]
+        self, numbers: NDArray[np.int64], books: Sequence[Books]
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Table of the one line, and tables for both parities; numbers: (2, L, ..) jobs of all lines, books: theirs."""
         cells, last = self._line.h.size, books[self.last]
@@ -520,8 +520,8 @@ class SharedContact(ContactBooks):
         for job, tables in zip(self._jobs, numbers, strict=True):
             job.bind(
                 tables=tables, lines=np.array(self.lines, np.int64), begins=self.begins, starts=self.starts,
-                joints=joints, inner=self._inner.numbers, pushes=self._pushes, shares=self._shares,
-                times=self._times, meetings=self.meetings,
+                inner=self._inner.numbers, pushes=self._pushes, shares=self._shares, times=self._times,
+                meetings=self.meetings,
             )  # fmt: skip
         self.call[ADDRESS] = shared_task.address(self._jobs[0].numbers)
         return self._inner.numbers, (self._jobs[0].numbers, self._jobs[1].numbers)

@@ -40,7 +40,7 @@ from hybrid.kernels.junctions.lines_contact import blank_touching_job, touch_net
 from hybrid.kernels.junctions.sheaves_and_winches import EACH_UNKNOWN, blank_unknowns_job, spin_sheaves, wind_lines
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.run.newton import NO_PUSH, in_plane, in_space, solve_network
+from hybrid.kernels.run.newton import NO_PUSH, in_plane, in_space, solve_network, workspace
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FREE, MOVES, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, Work, state_for
@@ -48,7 +48,7 @@ from hybrid.kernels.step.line_step import ASSEMBLY, RUN, TOLERANCE, Limits, Task
 from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
-from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, is_answered_again, room_of_line
+from hybrid.solve.stepper import REACH, JoinedLine, NetworkState, is_answered_again, room_of_factors, room_of_line
 
 # --- borders -----------------------------------------------------------------------------------
 
@@ -239,7 +239,7 @@ class LineJobs:
     ) -> None:  # fmt: skip
         """As of `NetworkSolver`."""
         self.lines, self.bodies, self.apart = tuple(lines), bodies, apart
-        self._nodes = sum(x.line.s.size for x in lines)
+        self._most_nodes = [1 + max(x.line.h.size, x.most_cells) for x in lines]  # cells may come and go in steps
         self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
         self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
         self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
@@ -269,7 +269,7 @@ class LineJobs:
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         self.turns: tuple[NetworkState, NetworkState] | None = None  # states between which steps go back and forth
         self._twists = [bool(x.line.torsion.size) for x in lines]  # whether torques pass through zones of each line
-        self._pressed = room_to_meet(self._nodes, self._rides, len(bodies)) if self._rides.size else {}
+        self._pressed = room_to_meet(sum(self._most_nodes), self._rides, len(bodies)) if self._rides.size else {}
         self._pushes: dict[int, list[Floats]] = {}  # out of planes, of states of even parity and of odd, by line
         self._marcher = 0  # address of the kernel that marches joined lines; 0: nobody has asked for it
         self._phase, self._at_rest, self._asked = np.zeros(1, np.int64), np.zeros(1, np.int64), NetworkTask()
@@ -284,6 +284,7 @@ class LineJobs:
         self.joined = list(range(len(lines)))
         self.lone_numbers = self._numbers[0, :0]
         self._lone_tables: dict[int, Table] = {}
+        self._beside: dict[int, tuple[Table]] = {}  # jobs that no step uses, of lines that are joined
         self._joined_tables = dict(enumerate(self._tables))
         for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
             limits = Limits(REACH * x.length, x.scale, 1)
@@ -310,8 +311,8 @@ class LineJobs:
     @cached_property
     def _rooms(self) -> Rooms:
         """What jobs of several lines work in, or of one in a run."""
-        lines, points, bodies, nodes = self.lines, len(self.net), self.bodies, self._nodes
-        carried = [x.line.h.size + 1 if is_answered_again(x) else 0 for x in lines]
+        lines, points, bodies, nodes = self.lines, len(self.net), self.bodies, sum(self._most_nodes)
+        carried = [most if is_answered_again(x) else 0 for x, most in zip(lines, self._most_nodes, strict=True)]
         joints = room_of_joints(lines, carried, points, bodies)
         joints |= {"net": self.net, "work": self.body_work}
         borders: dict[str, Any] = {"joints": {}}
@@ -326,7 +327,7 @@ class LineJobs:
             "gaps": self._gaps, "still": np.zeros_like(self._gaps), "allowed": self.allowed,
             "floors": np.array([-np.inf if x.slackens else x.floor for x in lines]),
             "first": np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64),
-            "begins": np.append(0, np.cumsum([x.line.s.size for x in lines])[:-1]).astype(np.int64),
+            "begins": np.append(0, np.cumsum(self._most_nodes)[:-1]).astype(np.int64),
         }  # fmt: skip
         whole = joints | {
             "near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides, "phase": self._phase,
@@ -338,7 +339,7 @@ class LineJobs:
 
     def bind_line(self, number: int, **values: Any) -> None:
         """Put values in their places in the jobs of a line."""
-        for table in self._tables[number]:
+        for table in (*self._tables[number], *self._beside.get(number, ())):
             table.bind(**values)
         if number in self._lone_tables:
             self._lone_tables[number].bind(**self._by_itself(number, values))
@@ -381,7 +382,7 @@ class LineJobs:
             table, own = self._tables[k][0].again(numbers), {"line": self.lines[k].line, "work": self.work[k]}
             table.bind(**self._by_itself(k, own | {"iterated": 0}))
             self._lone_tables[k] = table
-        self._part, self._joined_tables = None, dict(enumerate(self._tables))
+        self._part, self._joined_tables, self._beside = None, dict(enumerate(self._tables)), {}
         if self.lone and not self.is_apart:
             numbers = np.zeros((2, len(self.joined), self._numbers.shape[2]), np.int64)
             self._joined_tables = {
@@ -452,21 +453,41 @@ class LineJobs:
             self._near[self._mixes], self._mixes = JOINED, [False] * len(self.lines)
             self._group()
 
-    def tables_by_itself(self, number: int) -> tuple[Table, Table, Table]:
-        """Jobs of a line that is solved by itself: of that, and of steps of even and of odd parity."""
-        even, odd = self._tables[number]
-        return self._lone_tables[number], even, odd
+    def tables_beside(self, number: int) -> tuple[Table, list[tuple[Table, ...]]]:
+        """A job of a line alone, which its steps use if it is solved by itself; all jobs of steps by their parity."""
+        pairs = [self._tables[number]]
+        if number in self._lone_tables:
+            return self._lone_tables[number], pairs
+        if self._part is not None:
+            pairs.append(self._joined_tables[number])
+        even = self._tables[number][0]
+        self._beside[number] = (even.again(np.empty_like(even.numbers)),)
+        return self._beside[number][0], pairs
+
+    def room_beside(self, number: int, twice: bool) -> Callable[[int], Work]:
+        """What makes room for cells of a line, as its steps have it; twice: factors of a lone one serve again."""
+        x = self.lines[number]
+        keeps = twice if number in self._lone_tables else self._keeps(number, x)
+        return lambda cells: workspace(cells)._replace(**room_of_factors(x, cells, keeps))
+
+    def touches(self, number: int) -> bool:
+        """Whether a line touches itself, or may touch others."""
+        return number in self._touching_lines
+
+    def turns_with(self, number: int) -> bool:
+        """Whether an end of a line turns with a body."""
+        return bool(self.lines[number].seats[:, TURNS].any())
 
     def limits_by_itself(self, number: int) -> Limits:
         """What Newton's method works with in a line that is solved by itself."""
         return Limits(REACH * self.lines[number].length, self.lines[number].scale, MOST_OF_STEP, self.tolerance)
 
     def marcher_of(self, number: int) -> int:
-        """Address of the kernel that solves steps of a line that is solved by itself."""
+        """Address of the kernel that marches a line: those that are joined are marched in space."""
         return self._kernel_of(number).address(self._numbers[0, number])
 
     def _kernel_of(self, number: int) -> Any:
-        return in_plane if self.lines[number].line.bits & PLANAR else in_space
+        return in_plane if number in self._lone_tables and self.lines[number].line.bits & PLANAR else in_space
 
     @property
     def is_apart(self) -> bool:
@@ -508,7 +529,7 @@ class LineJobs:
             tables[k], shared[k] = numbers, (k, 0)
         if self.shared is not None:
             self._share(tables, shared)
-        room = room_to_touch(self._nodes, len(self.bodies), self._at_rest)
+        room = room_to_touch(sum(self._most_nodes), len(self.bodies), self._at_rest)
         self._rooms.borders["contact"] = lambda of: contact_of(of, room, tables, shared)
         for jobs in self._groups:
             jobs.set_borders()
@@ -517,7 +538,7 @@ class LineJobs:
         """Lines that may touch each other do so; the last of them is asked, and goes into the tables of all contact."""
         found = self.shared
         assert found is not None
-        one, both = found.attach(self._numbers, self.joints, self.books)
+        one, both = found.attach(self._numbers, self.books)
         for k, begin in zip(found.lines, found.begins.tolist(), strict=True):
             self.bind_line(k, contact=found.beside)
             shared[k] = found.last, begin

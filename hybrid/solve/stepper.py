@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,7 @@ class JoinedLine(NamedTuple):
     borne: Floats = np.zeros(0)  # (N,) strain that cells bear, of a line that may lie on obstacles; empty: of no other
     keeps_pace: bool = False  # whether its zones or its length follow the steps with the spectral radius of all lines
     winds: bool = False  # whether its winch holds a tension, which takes factors of its equations that serve again
+    most_cells: int = 0  # that it may have; at least those that it has
 
 
 class NetworkState(NamedTuple):
@@ -169,10 +170,14 @@ def room_of_line(x: JoinedLine, touches: bool = False) -> Work:
 
     touches: whether it touches itself.
     """
-    cells, joints = x.line.h.size, x.joints
-    kept = (cells + 1) * KEPT if is_answered_again(x) else KEPT if joints[1] >= 0 else 0
-    rows = np.zeros((1 if joints[0] >= 0 else 0, SIZE * WIDTH))
+    work = workspace_of(x.line, keep=touches or is_answered_again(x) or x.joints[1] >= 0)
+    return work._replace(**room_of_factors(x, x.line.h.size, touches))
+
+
+def room_of_factors(x: JoinedLine, cells: int, touches: bool) -> dict[str, Any]:
+    """Room for the factors and the first block row of a line in so many cells."""
+    kept = (cells + 1) * KEPT if is_answered_again(x) else KEPT if x.joints[1] >= 0 else 0
     if touches or x.line.torsion.size:  # these take all factors, which are kept in every march where they serve again
         kept = (cells + 1) * KEPT
-    work = workspace_of(x.line, keep=touches or is_answered_again(x) or joints[1] >= 0)
-    return work._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
+    rows = np.zeros((1 if x.joints[0] >= 0 else 0, SIZE * WIDTH))
+    return {"X": np.zeros((cells + 1) * ROW + kept), "rows": rows}

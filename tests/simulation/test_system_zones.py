@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 import yaml
 from bits import Stopping, differences, went_on
+from test_system_payout import crane
 
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.simulation.cell_changes import CellChanges
+from hybrid.simulation.payout_nodes import NodeChanges
+from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.simulation.run_zones import RunKinds
 from hybrid.solve.network_steps import NetworkSteps
 from tests.combinations.pairs import as_network
@@ -261,6 +264,39 @@ def test_cells_change_without_python_as_with_it(model: Tables, monkeypatch: pyte
     for name in ("position", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max"):
         assert np.abs(line[name] - cable[name]).max() <= 1e-9 * np.abs(cable[name]).max(), name
     assert np.array_equal(whole["points/end/position"], line.position[:, -1])
+
+
+def with_ends_exchanged() -> Tables:
+    """Three ropes that start at the weight, beside another one that is joined to nothing."""
+    scene = followed()
+    for line in scene["lines"].values():
+        line["start"], line["end"] = line["end"], line["start"]
+    heave = {"heave": {"amplitude": 2.0, "period": 6.0}, "ramp": 3.0}
+    scene["points"] |= {"p": {"position": [200, 0, 0]}, "q": {"position": [230, 0, 20], "motion": heave}}
+    scene["lines"]["lone"] = scene["lines"]["east"] | {"start": "p", "end": "q"}
+    return scene
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scene", [followed(), with_ends_exchanged(), crane()], ids=["ends", "starts", "winches"])
+def test_cells_of_joined_lines_change_without_python_as_with_it(scene: Tables, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of lines that meet at a point or a body: the same motion to the bit, and no other solver."""
+    scene = scene | {"time": {"duration": 6.0, "step": 0.02}, "output": {"every": 0.1}}
+    solvers, change = [], RunOfLines.go_on_changed
+    monkeypatch.setattr(RunOfLines, "go_on_changed", lambda *args: (solvers.append(1), change(*args))[1])
+    found = hybrid.run(scene)
+    assert not solvers
+    for changes in (CellChanges, NodeChanges):
+        monkeypatch.setattr(changes, "may_change", lambda *_: False)
+    other = hybrid.run(scene)
+    assert solvers
+    for name, line in found.lines.items():
+        like = other.lines[name]
+        assert cells(line) == cells(like) and [(e.t, e.kind) for e in line.events] == [
+            (e.t, e.kind) for e in like.events
+        ]
+        assert np.array_equal(line.position, like.position)
+        assert np.abs(line.tension - like.tension).max() < 1e-5 * like.tension.max()  # means with the step before
 
 
 @pytest.mark.long

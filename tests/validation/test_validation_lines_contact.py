@@ -15,7 +15,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
+from hybrid.kernels.contact.lines_distance import APART, HAVE_MET
 from hybrid.kernels.state.books import Clock
 from hybrid.model.network import build_network
 from hybrid.simulation.equilibrium import joined_lines

@@ -73,7 +73,7 @@ from hybrid.kernels.junctions.joined_lines import (
     turns,
 )
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
+from hybrid.kernels.march.assembly import JOINED, LEAST_SPIN_STIFFNESS
 from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Floats
@@ -443,14 +443,12 @@ def correct_all(network, gaps, m):
 
 
 @inner
-def move_joints(job, start, end):
+def move_joints(job):
     """Velocity of the ends that are joined to points, for the powers; that of held ends is set from outside."""
-    n, velocity, v = job.line.h.shape[0], job.books.velocity, job.new.v
-    for k in range(3):
-        if start >= 0:
-            velocity[0, k] = v[0, k]
-        if end >= 0:
-            velocity[1, k] = v[n, k]
+    for k in range(2):
+        if job.ends.held[k] == JOINED:
+            for i in range(3):
+                job.books.velocity[k, i] = job.new.v[k * job.line.h.shape[0], i]
 
 
 @inner

@@ -105,7 +105,6 @@ class SharedJob(NamedTuple):
     lines: NDArray[np.int64]  # (K,) numbers of those that may touch
     begins: NDArray[np.int64]  # (K,) where their nodes begin
     starts: Floats  # (K,) m, their arc lengths as parts of the one line, less their own
-    joints: NumberRows  # (L, 2) as kernels.junctions.borders.NetworkJob has it
     inner: NDArray[np.int64]  # table of a ContactJob of them as one line
     pushes: Blocks  # (2, N+1, 4) N, N m, forces of other lines on nodes, moments on cells
     shares: Blocks  # (2, K, SHARES) of Contact, likewise
@@ -279,7 +278,7 @@ def puts_energy_in(job, one):
     for k in range(job.lines.shape[0]):
         line_job = read(job.tables[job.lines[k]])
         books = line_job.books
-        move_joints(line_job, job.joints[job.lines[k], 0], job.joints[job.lines[k], 1])
+        move_joints(line_job)
         more, off = work_of_try(
             line_job.line, line_job.ends, contact, books.velocity, books.power[0], line_job.new, line_job.work,
             books.clock,

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.algebra.block_elimination import ROW
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import stretch_energy
 from hybrid.kernels.laws.element import chord
@@ -25,6 +26,7 @@ from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
+from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.mesh.cell_lengths import arc_less_chord
@@ -236,6 +238,8 @@ def begin_anew(job, state, s, line):
     clear(job.sea.flow)
     for j in range(job.work.report.shape[0]):
         job.work.report[j] = 0.0
+    for k in range(line.s.shape[0] * ROW, job.work.X.shape[0]):
+        job.work.X[k] = 0.0  # kept factors of what is no unknown are read as zeros
     job.nearest[0], job.nearest[1] = -1, -1
     job.books.clock.wave_step, job.books.counts.parity = wave_step(line, job.scale), 0
 
@@ -289,6 +293,10 @@ def before_forces(table):
     job = read(table)
     clock = job.books.clock
     ends_at(clock.now, job.moves, job.sea, job.ends, job.books.velocity)
+    for k in range(2):
+        if job.ends.held[k] == JOINED:
+            for i in range(3):
+                job.ends.position[k, i] = job.old.r[k * job.line.h.shape[0], i]
     sea_at(clock.now, job.sea)
     clear(job.work.u)
     if job.line.bits & WAVES:

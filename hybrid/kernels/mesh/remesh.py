@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.contact.lines_distance import forget_distances
 from hybrid.kernels.contact.self_distance import boxes_of
 from hybrid.kernels.laws.element import put_spring
 from hybrid.kernels.machine.binding import places
@@ -83,6 +84,7 @@ class RemeshPlaces(NamedNumbers, number=np.int64):
     used: int
     per_node: int  # numbers of a node that are kept at most, and room for all
     room: int
+    number: int  # of the line in its network
     boxes_at: int  # where the table of kernels.contact.self_distance has the rows of its tree
 
 
@@ -110,6 +112,8 @@ class RemeshJob(NamedTuple):
     in_run: NumberBlocks  # (2 sides, 3, run_places.size)
     even: Numbers  # likewise its tables in steps from states of even parity, and of odd
     odd: Numbers
+    even_joined: Numbers  # the same of steps without lines that are solved by themselves; empty: there are none
+    odd_joined: Numbers
     in_odd: NumberBlocks  # likewise of those
     beside: Numbers  # likewise a table of what moves beside: zones, or the reel
     beside_places: Numbers
@@ -118,6 +122,8 @@ class RemeshJob(NamedTuple):
     itself_places: Numbers  # empty: nobody watches
     in_itself: NumberBlocks
     waiting: NumberRows  # (lines, 3)
+    pairs: NumberRows  # (K, WATCHED) of kernels.contact.lines_distance: lines that may overlap
+    room: Rows  # (K, ROOM) and how far apart they are
 
 
 blank_remesh_job = blanks(RemeshJob)
@@ -169,6 +175,9 @@ def put_all(job):
         job.itself[job.at.boxes_at] = boxes(m)
     put_at(job.in_run[k], job.run_places, m, job.even)
     put_at(job.in_odd[k], job.run_places, m, job.odd)
+    if job.even_joined.shape[0] > 0:
+        put_at(job.in_run[k], job.run_places, m, job.even_joined)
+        put_at(job.in_odd[k], job.run_places, m, job.odd_joined)
 
 
 @inner
@@ -187,6 +196,7 @@ def end_change(job):
         call(calls.stand, job.beside)
     call(calls.after_forces, job.run)
     call(calls.books, job.run)
+    forget_distances(job.pairs, job.room, at.number)
     job.clock.previous = job.clock.now
     job.work[0, b.ZONES] += job.numbers[AFTER] - job.numbers[BEFORE]
 

@@ -183,7 +183,7 @@ def begin_lines(tables, s, safe):
 
 
 @inner
-def end_lines(tables, joints, floors, s, task, good):
+def end_lines(tables, floors, s, task, good):
     """Rates after a step of all lines, and if it is good their reports.
 
     Returns OK or why the step of a line is refused, the line and its cell.
@@ -195,7 +195,7 @@ def end_lines(tables, joints, floors, s, task, good):
             far, _, cell = end_line_step(None, 1, task, job, states_of(job), s)
             if far:
                 return TURNED_TOO_FAR, l, cell
-            move_joints(job, joints[l, START], joints[l, END])
+            move_joints(job)
             outcome = judge_line(job, task.dt, floors[l])
             if outcome != OK:
                 return outcome, l, int(job.work.report[SLACKEST_CELL]) if outcome == SLACK else cell
@@ -239,11 +239,12 @@ def begin_line(table):
     for i in range(job.new.bed.shape[0]):
         for k in range(3):
             job.new.bed[i, k] = job.old.bed[i, k]
+    move_joints(job)
     begin_books_of(table, job, job.books.clock.now)
 
 
 @inner
-def begin_books(tables, joints, t):
+def begin_books(tables, t):
     """Powers of the states as they are, what the seabed stores, and extremes where they are kept; t: s, now."""
     for l in range(tables.shape[0]):
         job = read(tables[l])
@@ -258,19 +259,19 @@ def begin_books(tables, joints, t):
         if touches(job):
             books.clock.now = t
             report[SELF_CONTACT_ENERGY] = ask_contact(job, REST)
-        move_joints(job, joints[l, START], joints[l, END])
+        move_joints(job)
         if job.reel != 0:
             call_reel(job.reel, job.reel_table)
         begin_books_of(tables[l], job, t)
 
 
 @inner
-def keep_books(tables, joints, dt, t):
+def keep_books(tables, dt, t):
     """Work of a step of all lines, extremes where they are kept, and what there is to look at; t: s, its end."""
     for l in range(tables.shape[0]):
         job = read(tables[l])
         line, new, books, report = job.line, job.new, job.books, job.work.report
-        move_joints(job, joints[l, START], joints[l, END])
+        move_joints(job)
         for k in range(RATES):
             books.power[1, k] = books.power[0, k]
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
@@ -299,7 +300,7 @@ def end_network_step(network, task, s, solved):
 
     Whoever keeps it books it (book_network_step).
     """
-    outcome, line, cell = end_lines(network.tables, network.joints, network.floors, s, task, solved)
+    outcome, line, cell = end_lines(network.tables, network.floors, s, task, solved)
     turned = end_bodies(network.old, network.new, network.work, s)
     if outcome != OK:
         return outcome, line, cell
@@ -313,7 +314,7 @@ def book_network_step(table):
     """Books of the step that was solved last, and is kept."""
     network = read_network(table)
     dt, t = network.asked.dt, network.asked.time
-    keep_books(network.tables, network.joints, dt, t)
+    keep_books(network.tables, dt, t)
     book_bodies(network.work, dt)
 
 

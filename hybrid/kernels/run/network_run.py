@@ -105,7 +105,7 @@ class StepsJob(NamedTuple):
     worked: Floats  # (3, B, WORK) of bodies: now, before the last step, before the step before
     members: NDArray[np.int64]  # (M, ..) tables of kernels.junctions.bodies.MembersJob, of bodies with members
     with_members: NDArray[np.int64]  # (M,) and which bodies these are
-    watched_even: NDArray[np.int64]  # of a kernels.junctions.lines_distance.LinesJob, after a step of `even`
+    watched_even: NDArray[np.int64]  # of a kernels.contact.lines_distance.LinesJob, after a step of `even`
     watched_odd: NDArray[np.int64]
     followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
     due: NDArray[np.int64]  # (Z,) whether they ask for something after the last step
@@ -122,7 +122,7 @@ class StepsJob(NamedTuple):
     book: int = 0  # of book_network_step
     sampler: int = 0  # of sample_network
     stirrer: int = 0  # of kernels.junctions.bodies.update_members; 0: no body has members
-    watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
+    watcher: int = 0  # of kernels.contact.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.advance_zones; 0: no zones move, or Python follows them
     runner: int = 0  # of run_network, and of kernels.mesh.remesh.ask_cells and change_cells; 0: Python changes cells
     asker: int = 0

@@ -341,7 +341,7 @@ def solve_network(table):
         elif cut_short:
             outcome = CUT_SHORT
     if task.what == ASSEMBLY and outcome == OK:
-        begin_books(tables, network.joints, network.asked.time)
+        begin_books(tables, network.asked.time)
         book_bodies(network.work, 0.0)
     return outcome, it, left, line, where
 

@@ -300,6 +300,14 @@ def examine_pair(job, pair, row):
         pair[HAVE_MET], row[TIME] = NEAR, job.clock.now
 
 
+@inner
+def forget_distances(pairs, room, l):
+    """How far line l is from others is found anew: it has other nodes."""
+    for k in range(pairs.shape[0]):
+        if pairs[k, A] == l or pairs[k, B] == l:
+            room[k, APART] = 0.0
+
+
 @kernel
 def watch_lines(table):
     """Note which pairs of lines have met, or are near, in the step that was taken last; how many are near now."""
