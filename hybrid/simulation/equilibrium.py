@@ -173,7 +173,7 @@ def joined_lines(model: NetworkModel, t: float) -> list[JoinedLine]:
                 model.rides, borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0),
                 x.payout is not None or x.layout is not None,
                 x.payout is not None and x.payout.holds_tension,
-                x.most_cells,
+                most_cells=x.most_cells,
             )
         )  # fmt: skip
     return lines
