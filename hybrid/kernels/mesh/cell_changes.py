@@ -238,8 +238,9 @@ def begin_anew(job, state, s, line):
     clear(job.sea.flow)
     for j in range(job.work.report.shape[0]):
         job.work.report[j] = 0.0
-    for k in range(line.s.shape[0] * ROW, job.work.X.shape[0]):
-        job.work.X[k] = 0.0  # kept factors of what is no unknown are read as zeros
+    X = job.work.X
+    for k in range(X.shape[0] if X.shape[0] > line.s.shape[0] * ROW else 0):
+        X[k] = 0.0  # factors that serve again are read as zeros where there is no unknown any more
     job.nearest[0], job.nearest[1] = -1, -1
     job.books.clock.wave_step, job.books.counts.parity = wave_step(line, job.scale), 0
 
