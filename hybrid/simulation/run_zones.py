@@ -174,19 +174,24 @@ class RunZones(Part):
             loop.counts.asks |= b.ASK_STEPS
         if any(x.observer.writes_criteria for x in mine):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
-        for x in self.lines:
-            self._change_by_itself(x, not loop.counts.asks & b.ASK_BEFORE)
-        loop.change_cells([x.cells.job if x.cells is not None else None for x in self.lines])
+        changes = [self._cells_of(x) for x in self.lines]
+        loop.change_cells([x.job if x is not None else None for x in changes])
 
-    def _change_by_itself(self, x: _LineZones, may: bool) -> None:
-        """Let cells of a line change without Python from now on, where that can be."""
-        run, line = self._run, self._run.lines[x.number]
-        if x.cells is None or not x.cells.fits_zones(x.switching):
-            x.cells = None
-            if may and not run.loop.counts.samples and CellChanges.may_change(run, x.number, x.switching):
-                x.cells = CellChanges(run, x.number, x.switching)
-                x.cells.adopt()
-            line.cells = x.cells
+    def _cells_of(self, x: _LineZones) -> CellChanges | None:
+        """What changes cells of a line without Python, with the solver that has the line now; None: nothing does."""
+        if x.cells is not None and not x.cells.fits_zones(x.switching):
+            x.cells = self._run.lines[x.number].cells = None
+        return x.cells
+
+    def _give_cells(self, x: _LineZones) -> None:
+        """Let cells of a line, which are to change after this step, do so without Python, where that can be."""
+        run, (now, then) = self._run, self._run.loop.states
+        attached = now is run.state and then is run.other  # else steps are still to begin from what is there now
+        free = attached and not (run.loop.counts.asks & b.ASK_BEFORE or run.loop.counts.samples)
+        if free and self._cells_of(x) is None and CellChanges.may_change(run, x.number, x.switching):
+            run.lines[x.number].write_down()
+            run.lines[x.number].cells = x.cells = CellChanges(run, x.number, x.switching)
+            x.cells.adopt()
 
     def sync(self) -> None:
         """Python knows of the cells of now."""
@@ -336,17 +341,18 @@ class RunZones(Part):
         changes = [(x, x.pending) for x in self.lines if x.pending is not None]
         for x in self.lines:
             x.pending = None
+        for x, _ in changes:
+            self._give_cells(x)
         self._change(changes)
 
     def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
         """Carry out changes of lines, in their arrays where that can be."""
         run = self._run
         for x, change in changes:
-            if x.cells is not None and not x.cells.fits_zones(x.switching):  # another solver has the line now
-                x.cells = run.lines[x.number].cells = None
-            if x.cells is not None:
-                booked = x.cells.change() if change.same else x.cells.change_zones(change)
-                x.cells.sync()
+            cells = self._cells_of(x)
+            if cells is not None:
+                booked = cells.change() if change.same else cells.change_zones(change)
+                cells.sync()
                 note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)
         changes = [(x, change) for x, change in changes if x.cells is None]
         if not changes:
