@@ -389,15 +389,17 @@ def eliminate_condensed(cell, L, U, D, F, X):
 @inner
 def eliminate8(b, c):
     f = b[0]
-    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
-            b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6], b[8] - f * c[7])  # fmt: skip
+    low = (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3])
+    high = (b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6], b[8] - f * c[7])
+    return low + high
 
 
 @inner
 def eliminate7(b, c):
     f = b[0]
-    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
-            b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6])  # fmt: skip
+    low = (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3])
+    high = (b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6])
+    return low + high
 
 
 @inner
@@ -455,11 +457,8 @@ def substitute(X, x, joined, more):
         p = i * ROW
         for k in range(SIZE):
             q = p + SPAN * k
-            x[i, k] = (
-                X[q + 8]
-                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
-                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
-            )  # fmt: skip
+            left = X[q + 8] - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
+            x[i, k] = left - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
             if more is not None:
                 columns, first, low, high, q = more
                 for b in range(low, high):

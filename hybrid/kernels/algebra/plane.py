@@ -31,6 +31,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.block_elimination import eliminate6, eliminate7, eliminate8, solve_three
+from hybrid.kernels.algebra.rotations import SMALL_SQUARE, arc_over_sine
 from hybrid.kernels.machine.compile import inner, kernel
 
 
@@ -128,9 +129,8 @@ def angle_between(a, b):
     """Angle about n from direction a to direction b, between -pi and pi."""
     s, c = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
     x = s * s
-    if c > 0.0 and x < 0.04:  # asin as a series in s^2, exact to round-off there
-        return s * (1.0 + x * (1 / 6 + x * (3 / 40 + x * (15 / 336 + x * (105 / 3456 + x * (945 / 42240 + x * (
-            10395 / 599040 + x * (135135 / 9676800 + x * (2027025 / 175472640 + x * 34459425 / 3530096640)))))))))  # fmt: skip
+    if c > 0.0 and x < SMALL_SQUARE:
+        return s * arc_over_sine(x)
     return math.atan2(s, c)
 
 

@@ -94,21 +94,27 @@ def mat_matT(A, B):
 
 
 @inner
+def stack(x, y, z):
+    """The matrix with three rows."""
+    return (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2])
+
+
+@inner
 def madd(A, B):
-    return (
-        A[0] + B[0], A[1] + B[1], A[2] + B[2],
-        A[3] + B[3], A[4] + B[4], A[5] + B[5],
-        A[6] + B[6], A[7] + B[7], A[8] + B[8],
-    )  # fmt: skip
+    return stack(
+        (A[0] + B[0], A[1] + B[1], A[2] + B[2]),
+        (A[3] + B[3], A[4] + B[4], A[5] + B[5]),
+        (A[6] + B[6], A[7] + B[7], A[8] + B[8]),
+    )
 
 
 @inner
 def msub(A, B):
-    return (
-        A[0] - B[0], A[1] - B[1], A[2] - B[2],
-        A[3] - B[3], A[4] - B[4], A[5] - B[5],
-        A[6] - B[6], A[7] - B[7], A[8] - B[8],
-    )  # fmt: skip
+    return stack(
+        (A[0] - B[0], A[1] - B[1], A[2] - B[2]),
+        (A[3] - B[3], A[4] - B[4], A[5] - B[5]),
+        (A[6] - B[6], A[7] - B[7], A[8] - B[8]),
+    )
 
 
 @inner
@@ -118,11 +124,7 @@ def mscale(x, A):
 
 @inner
 def outer(a, b):
-    return (
-        a[0] * b[0], a[0] * b[1], a[0] * b[2],
-        a[1] * b[0], a[1] * b[1], a[1] * b[2],
-        a[2] * b[0], a[2] * b[1], a[2] * b[2],
-    )  # fmt: skip
+    return stack(scale(a[0], b), scale(a[1], b), scale(a[2], b))
 
 
 @inner
@@ -134,10 +136,7 @@ def hat(a):
 @inner
 def mat_hat(A, d):
     """A [d]x: each row crossed with d."""
-    r0 = cross((A[0], A[1], A[2]), d)
-    r1 = cross((A[3], A[4], A[5]), d)
-    r2 = cross((A[6], A[7], A[8]), d)
-    return (r0[0], r0[1], r0[2], r1[0], r1[1], r1[2], r2[0], r2[1], r2[2])
+    return stack(cross((A[0], A[1], A[2]), d), cross((A[3], A[4], A[5]), d), cross((A[6], A[7], A[8]), d))
 
 
 @inner
@@ -175,8 +174,16 @@ def spin_about(a1, d, psi):
     return (c * a1[0] + s * a2[0], c * a1[1] + s * a2[1], c * a1[2] + s * a2[2])
 
 
-# Below this angle the series of the functions of q are exact to round-off (next term < 1e-16).
-SMALL = 0.2
+# Below this angle the series of the functions of q are exact to round-off (next term < 1e-16); below this square of a
+# sine, that of its arc.
+SMALL, SMALL_SQUARE = 0.2, 0.04
+
+
+@inner
+def arc_over_sine(x):
+    """asin(s)/s as a series in x = s^2."""
+    tail = 10395 / 599040 + x * (135135 / 9676800 + x * (2027025 / 175472640 + x * 34459425 / 3530096640))
+    return 1.0 + x * (1 / 6 + x * (3 / 40 + x * (15 / 336 + x * (105 / 3456 + x * (945 / 42240 + x * tail)))))
 
 
 @inner
@@ -185,9 +192,8 @@ def log_rotation(E):
     v = (0.5 * (E[7] - E[5]), 0.5 * (E[2] - E[6]), 0.5 * (E[3] - E[1]))  # sin(q) * axis
     c = 0.5 * (E[0] + E[4] + E[8] - 1.0)
     x = dot(v, v)
-    if c > 0.0 and x < 0.04:  # asin(s)/s as a series in x = s^2
-        f = 1.0 + x * (1 / 6 + x * (3 / 40 + x * (15 / 336 + x * (105 / 3456 + x * (945 / 42240 + x * (
-            10395 / 599040 + x * (135135 / 9676800 + x * (2027025 / 175472640 + x * 34459425 / 3530096640))))))))  # fmt: skip
+    if c > 0.0 and x < SMALL_SQUARE:
+        f = arc_over_sine(x)
     else:
         s = math.sqrt(x)
         f = math.atan2(s, c) / s if s > 0.0 else math.nan  # a half turn has no direction: NaN, found by the step
@@ -198,10 +204,10 @@ def log_rotation(E):
 def jacobian_functions(q2):
     """g and g1 of q^2."""
     if q2 < SMALL:
-        g = 1 / 12 + q2 * (1 / 720 + q2 * (1 / 30240 + q2 * (1 / 1209600 + q2 * (1 / 47900160 + q2 * (
-            691 / 1307674368000 + q2 * (1 / 74724249600 + q2 * 3617 / 10670622842880000))))))  # fmt: skip
-        g1 = 2 * (1 / 720 + q2 * (2 / 30240 + q2 * (3 / 1209600 + q2 * (4 / 47900160 + q2 * (
-            5 * 691 / 1307674368000 + q2 * (6 / 74724249600 + q2 * 7 * 3617 / 10670622842880000))))))  # fmt: skip
+        tail = 691 / 1307674368000 + q2 * (1 / 74724249600 + q2 * 3617 / 10670622842880000)
+        g = 1 / 12 + q2 * (1 / 720 + q2 * (1 / 30240 + q2 * (1 / 1209600 + q2 * (1 / 47900160 + q2 * tail))))
+        tail = 5 * 691 / 1307674368000 + q2 * (6 / 74724249600 + q2 * 7 * 3617 / 10670622842880000)
+        g1 = 2 * (1 / 720 + q2 * (2 / 30240 + q2 * (3 / 1209600 + q2 * (4 / 47900160 + q2 * tail))))
         return g, g1
     q = math.sqrt(q2)
     half = 0.5 * q
@@ -217,11 +223,11 @@ def inverse_left_jacobian(k, g):
     """P = I - [k]x/2 + g [k]x^2."""
     x, y, z = k
     gx, gy, gz = g * x, g * y, g * z
-    return (
-        1.0 - gy * y - gz * z, 0.5 * z + gx * y, -0.5 * y + gx * z,
-        -0.5 * z + gx * y, 1.0 - gx * x - gz * z, 0.5 * x + gy * z,
-        0.5 * y + gx * z, -0.5 * x + gy * z, 1.0 - gx * x - gy * y,
-    )  # fmt: skip
+    return stack(
+        (1.0 - gy * y - gz * z, 0.5 * z + gx * y, -0.5 * y + gx * z),
+        (-0.5 * z + gx * y, 1.0 - gx * x - gz * z, 0.5 * x + gy * z),
+        (0.5 * y + gx * z, -0.5 * x + gy * z, 1.0 - gx * x - gy * y),
+    )
 
 
 @inner
@@ -232,11 +238,11 @@ def d_double_cross(k, n, g, g1):
     a = (g1 * w[0] - 2.0 * g * n[0], g1 * w[1] - 2.0 * g * n[1], g1 * w[2] - 2.0 * g * n[2])
     gk = (g * k[0], g * k[1], g * k[2])
     t = g * kn
-    return (
-        t + gk[0] * n[0] + a[0] * k[0], gk[0] * n[1] + a[0] * k[1], gk[0] * n[2] + a[0] * k[2],
-        gk[1] * n[0] + a[1] * k[0], t + gk[1] * n[1] + a[1] * k[1], gk[1] * n[2] + a[1] * k[2],
-        gk[2] * n[0] + a[2] * k[0], gk[2] * n[1] + a[2] * k[1], t + gk[2] * n[2] + a[2] * k[2],
-    )  # fmt: skip
+    return stack(
+        (t + gk[0] * n[0] + a[0] * k[0], gk[0] * n[1] + a[0] * k[1], gk[0] * n[2] + a[0] * k[2]),
+        (gk[1] * n[0] + a[1] * k[0], t + gk[1] * n[1] + a[1] * k[1], gk[1] * n[2] + a[1] * k[2]),
+        (gk[2] * n[0] + a[2] * k[0], gk[2] * n[1] + a[2] * k[1], t + gk[2] * n[2] + a[2] * k[2]),
+    )
 
 
 @inner

@@ -130,12 +130,10 @@ def find_boxes(job):
 @inner
 def overlap(moved, a, b):
     """Whether the boxes of two lines overlap."""
-    x, y, z, up = LOW, LOW + 1, LOW + 2, HIGH - LOW
-    return not (
-        moved[a, x] > moved[b, x + up] or moved[b, x] > moved[a, x + up]
-        or moved[a, y] > moved[b, y + up] or moved[b, y] > moved[a, y + up]
-        or moved[a, z] > moved[b, z + up] or moved[b, z] > moved[a, z + up]
-    )  # fmt: skip
+    for k in range(3):
+        if moved[a, LOW + k] > moved[b, HIGH + k] or moved[b, LOW + k] > moved[a, HIGH + k]:
+            return False
+    return True
 
 
 @inner

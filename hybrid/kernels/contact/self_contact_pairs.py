@@ -7,7 +7,7 @@ that.  Between two lines is a cell that is none: no piece has it, and what follo
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,20 +176,20 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False, lines: in
     held, leaves = points if friction else 0, 1
     while leaves * LEAF < nodes:
         leaves *= 2
-    kind = z(nodes, np.int64)
-    kind[0], kind[-1] = FIRST, LAST
-    return Contact(
-        kind=kind, of=z(nodes, np.int64), rolls=z(nodes), meets=np.ones((lines, lines), np.int64), rubs=z((lines, lines)),
-        joined=np.full((lines, 2), -1, np.int64), tips=z((lines, 2), np.int64), shares=z((lines, SHARES)),
-        width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=ContactNumbers(),
-        counts=ContactCounts(), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
-        pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
-        move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64), energy=z(5),
-        power=z(RATES), x=z((nodes, 4)), y=z((nodes, 4)), z=z((nodes, 5)), sweep=z((nodes, SWEEP)),
-        basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
-        holds=z((held, HOLD)), arms=z((held, 4, ARM)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
-        links=z(held, np.int64),
-    )  # fmt: skip
+    shapes: dict[str, Any] = {"meets": (lines, lines), "joined": (lines, 2), "tips": (lines, 2)}
+    shapes |= {"stack": (4 * DEPTH, 2), "pairs": (PAIRS_OF_NODE * nodes, 2), "links": held}
+    shapes |= dict.fromkeys(("kind", "of", "samples", "nodes", "marks", "heads"), nodes)
+    whole: dict[str, Any] = {name: z(shape, np.int64) for name, shape in shapes.items()}
+    whole["kind"][0], whole["kind"][-1], whole["meets"][:], whole["joined"][:] = FIRST, LAST, 1, -1
+    whole["samples"][:] = 1
+    shapes = {"rubs": (lines, lines), "shares": (lines, SHARES), "tree": (2 * leaves, 12), "points": (points, POINT)}
+    shapes |= {"at": (nodes, 3), "move": (nodes, 3), "x": (nodes, 4), "y": (nodes, 4), "z": (nodes, 5), "energy": 5}
+    shapes |= dict.fromkeys(("rolls", "width", "stiff", "mass", "near"), nodes)
+    shapes |= {"power": RATES, "sweep": (nodes, SWEEP), "hessenberg": (MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)}
+    shapes |= {"basis": (MOST_PRODUCTS + 1, (4 if friction else 3) * nodes), "holds": (held, HOLD)}
+    shapes |= {"arms": (held, 4, ARM), "grips": (held, GRIP), "fresh": (held, GRIP)}
+    real: dict[str, Any] = {name: z(shape) for name, shape in shapes.items()}
+    return Contact(numbers=ContactNumbers(), counts=ContactCounts(), **whole, **real)
 
 
 by_reference(blank_contact(1))

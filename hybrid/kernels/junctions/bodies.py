@@ -26,6 +26,7 @@ from hybrid.kernels.algebra.rotations import (
     mat_vec,
     outer,
     scale,
+    stack,
     sub,
     vec_mat,
     vector,
@@ -93,9 +94,7 @@ def put(row, o, x):
 
 @inner
 def matrix(row, o):
-    return (
-        row[o], row[o + 1], row[o + 2], row[o + 3], row[o + 4], row[o + 5], row[o + 6], row[o + 7], row[o + 8],
-    )  # fmt: skip
+    return stack(vector(row, o), vector(row, o + 3), vector(row, o + 6))
 
 
 @inner
@@ -115,34 +114,24 @@ def rotation(n):
         a, b = math.sin(q) / q, 2.0 * (math.sin(0.5 * q) / q) ** 2
     S, D = hat(n), outer(n, n)
     c = 1.0 - b * q2
-    return (
-        c + b * D[0], a * S[1] + b * D[1], a * S[2] + b * D[2],
-        a * S[3] + b * D[3], c + b * D[4], a * S[5] + b * D[5],
-        a * S[6] + b * D[6], a * S[7] + b * D[7], c + b * D[8],
-    )  # fmt: skip
+    return stack(
+        (c + b * D[0], a * S[1] + b * D[1], a * S[2] + b * D[2]),
+        (a * S[3] + b * D[3], c + b * D[4], a * S[5] + b * D[5]),
+        (a * S[6] + b * D[6], a * S[7] + b * D[7], c + b * D[8]),
+    )
+
+
+@inner
+def row_times(row, o, x, y):
+    """Six numbers of a row times (x, y)."""
+    return dot(vector(row, o), x) + row[o + 3] * y[0] + row[o + 4] * y[1] + row[o + 5] * y[2]
 
 
 @inner
 def times(row, o, x, y):
     """The 6 x 6 matrix at o of a row times (x, y), as two vectors."""
-    return (
-        (
-            row[o] * x[0] + row[o + 1] * x[1] + row[o + 2] * x[2]
-            + row[o + 3] * y[0] + row[o + 4] * y[1] + row[o + 5] * y[2],
-            row[o + 6] * x[0] + row[o + 7] * x[1] + row[o + 8] * x[2]
-            + row[o + 9] * y[0] + row[o + 10] * y[1] + row[o + 11] * y[2],
-            row[o + 12] * x[0] + row[o + 13] * x[1] + row[o + 14] * x[2]
-            + row[o + 15] * y[0] + row[o + 16] * y[1] + row[o + 17] * y[2],
-        ),
-        (
-            row[o + 18] * x[0] + row[o + 19] * x[1] + row[o + 20] * x[2]
-            + row[o + 21] * y[0] + row[o + 22] * y[1] + row[o + 23] * y[2],
-            row[o + 24] * x[0] + row[o + 25] * x[1] + row[o + 26] * x[2]
-            + row[o + 27] * y[0] + row[o + 28] * y[1] + row[o + 29] * y[2],
-            row[o + 30] * x[0] + row[o + 31] * x[1] + row[o + 32] * x[2]
-            + row[o + 33] * y[0] + row[o + 34] * y[1] + row[o + 35] * y[2],
-        ),
-    )  # fmt: skip
+    force = (row_times(row, o, x, y), row_times(row, o + 6, x, y), row_times(row, o + 12, x, y))
+    return force, (row_times(row, o + 18, x, y), row_times(row, o + 24, x, y), row_times(row, o + 30, x, y))
 
 
 @inner

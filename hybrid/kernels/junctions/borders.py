@@ -114,10 +114,9 @@ read_network = reader(blank_network_job())
 def task_of(asked):
     """The task that is asked."""
     limits = Limits(asked.reach, asked.scale, int(asked.most), asked.tolerance)
-    return Task(
-        int(asked.what), asked.dt, asked.before, asked.rho_of_step, asked.cv, asked.ca, False, limits, asked.cut != 0.0,
-        asked.rho_of_last, asked.fixed != 0.0,
-    )  # fmt: skip
+    what, is_cut, is_fixed = int(asked.what), asked.cut != 0.0, asked.fixed != 0.0
+    before, rho, last = asked.before, asked.rho_of_step, asked.rho_of_last
+    return Task(what, asked.dt, before, rho, asked.cv, asked.ca, False, limits, is_cut, last, is_fixed)
 
 
 # Of the radius of a line: how far from a body or sheave that is free it is near it.  A step goes a fraction of that where

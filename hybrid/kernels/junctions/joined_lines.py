@@ -279,11 +279,8 @@ def carry_functional(X, columns, parts, first, begin, n, joined, low, high, f):
         row[0], row[1], row[2], row[3], row[4] = a0, a1, a2, a3, a4
         f[LEFT] += a0 * X[p + 8] + a1 * X[q + 8] + a2 * X[s + 8] + a3 * X[t + 8] + a4 * X[v + 8]
         for b in range(low, high):
-            x = columns[b]
-            f[OF + b] += (
-                a0 * x[first + i, 0] + a1 * x[first + i, 1] + a2 * x[first + i, 2]
-                + a3 * x[first + i, 3] + a4 * x[first + i, 4]
-            )  # fmt: skip
+            x, o = columns[b], first + i
+            f[OF + b] += a0 * x[o, 0] + a1 * x[o, 1] + a2 * x[o, 2] + a3 * x[o, 3] + a4 * x[o, 4]
         for j in range(SIZE):
             f[j] = f[NEXT + j] - (a0 * X[p + j] + a1 * X[q + j] + a2 * X[s + j] + a3 * X[t + j] + a4 * X[v + j])
             f[NEXT + j] = 0.0
@@ -300,8 +297,6 @@ def count_right(X, parts, first, begin, end, left):
     """What is left of a functional with the right-hand sides X of blocks begin to end - 1; left: with none of them."""
     for i in range(begin, end):
         p, row = i * ROW + SPAN - 1, parts[first + i]
-        left += (
-            row[0] * X[p] + row[1] * X[p + SPAN] + row[2] * X[p + 2 * SPAN] + row[3] * X[p + 3 * SPAN]
-            + row[4] * X[p + 4 * SPAN]
-        )  # fmt: skip
+        q, s, t, v = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
+        left += row[0] * X[p] + row[1] * X[q] + row[2] * X[s] + row[3] * X[t] + row[4] * X[v]
     return left

@@ -158,9 +158,8 @@ def put_functional(f, low, high, joined, S, e):
 @inner
 def hand_over(l, job, network, cv):
     """What a line hands over: its rows and columns of S; cv: of this step."""
-    joints, seats, columns, parts, gaps, answers, S = (
-        network.joints, network.seats, network.columns, network.parts, network.gaps, network.answers, network.S,
-    )  # fmt: skip
+    joints, seats, columns, parts = network.joints, network.seats, network.columns, network.parts
+    gaps, answers, S = network.gaps, network.answers, network.S
     new, work, points = network.new, network.work, network.net.shape[0]
     for r in range(RIGHT):
         for c in range(HANDED):

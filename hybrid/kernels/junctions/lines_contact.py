@@ -277,13 +277,11 @@ def puts_energy_in(job, one):
         done = numbers.slip_work + numbers.tried - numbers.stored
     for k in range(job.lines.shape[0]):
         line_job = read(job.tables[job.lines[k]])
-        books = line_job.books
+        books, line, new, work = line_job.books, line_job.line, line_job.new, line_job.work
         move_joints(line_job)
-        more, off = work_of_try(
-            line_job.line, line_job.ends, contact, books.velocity, books.power[0], line_job.new, line_job.work,
-            books.clock,
-        )  # fmt: skip
-        done += more - line_job.work.report[SELF_FRICTION_WORK]
+        velocity, power = books.velocity, books.power[0]
+        more, off = work_of_try(line, line_job.ends, contact, velocity, power, new, work, books.clock)
+        done += more - work.report[SELF_FRICTION_WORK]
         missed += off
     return is_gain(contact, one.work.u, done, missed)
 

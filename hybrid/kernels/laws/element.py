@@ -63,6 +63,7 @@ from hybrid.kernels.algebra.rotations import (
     outer,
     project,
     scale,
+    stack,
     sub,
     vec_mat,
 )
@@ -204,11 +205,11 @@ def relative_rotation(Ra, Rb):
 @inner
 def columns_scaled(A, b):
     """A diag(b)."""
-    return (
-        A[0] * b[0], A[1] * b[1], A[2] * b[2],
-        A[3] * b[0], A[4] * b[1], A[5] * b[2],
-        A[6] * b[0], A[7] * b[1], A[8] * b[2],
-    )  # fmt: skip
+    return stack(
+        (A[0] * b[0], A[1] * b[1], A[2] * b[2]),
+        (A[3] * b[0], A[4] * b[1], A[5] * b[2]),
+        (A[6] * b[0], A[7] * b[1], A[8] * b[2]),
+    )
 
 
 @inner
@@ -333,8 +334,8 @@ def before(C, M, d, il):
     """B and b: how M answers (with a minus sign) to the chord and the spin of the cell before the node."""
     A, a = after(C, d, il)
     MxS = mscale(il, mat_hat(hat(M), d))
-    return madd(A, MxS), (a[0] + M[1] * d[2] - M[2] * d[1], a[1] + M[2] * d[0] - M[0] * d[2],
-                          a[2] + M[0] * d[1] - M[1] * d[0])  # fmt: skip
+    x, y = a[0] + M[1] * d[2] - M[2] * d[1], a[1] + M[2] * d[0] - M[0] * d[2]
+    return madd(A, MxS), (x, y, a[2] + M[0] * d[1] - M[1] * d[0])
 
 
 @inner
@@ -343,10 +344,6 @@ def angular_velocity(d, d1, w3, il, D1, cv):
     w = cross(d, d1)
     # dw/de = [d]x D1 - [d1]x P/l + w3 P/l
     dxD1 = mat_mat(hat(d), D1)
-    P = (
-        1.0 - d[0] * d[0], -d[0] * d[1], -d[0] * d[2],
-        -d[1] * d[0], 1.0 - d[1] * d[1], -d[1] * d[2],
-        -d[2] * d[0], -d[2] * d[1], 1.0 - d[2] * d[2],
-    )  # fmt: skip
+    P = project(d)
     We = madd(msub(dxD1, mscale(il, mat_mat(hat(d1), P))), mscale(w3 * il, P))
     return (w[0] + w3 * d[0], w[1] + w3 * d[1], w[2] + w3 * d[2]), We, scale(cv, d)

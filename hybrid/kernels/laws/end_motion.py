@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, hat, mat_mat, mat_vec, scale, transport
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, hat, mat_mat, mat_vec, scale, stack, transport
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import NOT_ON_BODY, PLACE_THERE, RIDES, SEAT_THERE, TURNS_FREELY
@@ -151,11 +151,11 @@ def turn_by_angles(angle, rate):
     """Rz(yaw) Ry(pitch) Rx(roll) and its angular velocity: every rate about its own axis, turned by what follows."""
     cx, cy, cz = math.cos(angle[0]), math.cos(angle[1]), math.cos(angle[2])
     sx, sy, sz = math.sin(angle[0]), math.sin(angle[1]), math.sin(angle[2])
-    turn = (
-        cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx,
-        sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx,
-        -sy, cy * sx, cy * cx,
-    )  # fmt: skip
+    turn = stack(
+        (cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx),
+        (sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx),
+        (-sy, cy * sx, cy * cx),
+    )
     roll, pitch, yaw = rate
     return turn, (cz * cy * roll - sz * pitch, sz * cy * roll + cz * pitch, yaw - sy * roll)
 
@@ -173,11 +173,11 @@ def turn_by_vector(v, rate):
         c = (1.0 - a) / q2
     skew, once = hat(v), cross(v, rate)
     square = mat_mat(skew, skew)
-    turn = (
-        1.0 + a * skew[0] + b * square[0], a * skew[1] + b * square[1], a * skew[2] + b * square[2],
-        a * skew[3] + b * square[3], 1.0 + a * skew[4] + b * square[4], a * skew[5] + b * square[5],
-        a * skew[6] + b * square[6], a * skew[7] + b * square[7], 1.0 + a * skew[8] + b * square[8],
-    )  # fmt: skip
+    turn = stack(
+        (1.0 + a * skew[0] + b * square[0], a * skew[1] + b * square[1], a * skew[2] + b * square[2]),
+        (a * skew[3] + b * square[3], 1.0 + a * skew[4] + b * square[4], a * skew[5] + b * square[5]),
+        (a * skew[6] + b * square[6], a * skew[7] + b * square[7], 1.0 + a * skew[8] + b * square[8]),
+    )
     return turn, add(rate, add(scale(b, once), scale(c, cross(v, once))))
 
 

@@ -110,10 +110,8 @@ def row3(table, k, at):
 @inner
 def row9(table, k, at):
     """Nine numbers of a row."""
-    return (
-        table[k, at], table[k, at + 1], table[k, at + 2], table[k, at + 3], table[k, at + 4], table[k, at + 5],
-        table[k, at + 6], table[k, at + 7], table[k, at + 8],
-    )  # fmt: skip
+    a, b, c = row3(table, k, at), row3(table, k, at + 3), row3(table, k, at + 6)
+    return a + b + c
 
 
 @inner

@@ -62,7 +62,7 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, dot, get3, scale
+from hybrid.kernels.algebra.rotations import add, dot, get3, madd, outer, scale, stack
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import BREAKOUT, FRICTION, SOIL
 from hybrid.kernels.state.state import ROWS, Floats, Line, Sea, blank_state, in_sea, no_sea
@@ -167,11 +167,11 @@ def normal_turns(sea, x, n):
     zxx, zxy, zyy = bends_on_grid(sea, x[0], x[1])
     # n . H
     a, b = n[0] * zxx + n[1] * zxy, n[0] * zxy + n[1] * zyy
-    return (
-        n[2] * (n[0] * a - zxx), n[2] * (n[0] * b - zxy), 0.0,
-        n[2] * (n[1] * a - zxy), n[2] * (n[1] * b - zyy), 0.0,
-        n[2] * n[2] * a, n[2] * n[2] * b, 0.0,
-    )  # fmt: skip
+    return stack(
+        (n[2] * (n[0] * a - zxx), n[2] * (n[0] * b - zxy), 0.0),
+        (n[2] * (n[1] * a - zxy), n[2] * (n[1] * b - zyy), 0.0),
+        (n[2] * n[2] * a, n[2] * n[2] * b, 0.0),
+    )
 
 
 @inner
@@ -391,12 +391,7 @@ def friction(q, N, axis, normal, mu_a, mu_l, sl):
     n = -N * c
     ga = (aa * axis[0] + ab * side[0], aa * axis[1] + ab * side[1], aa * axis[2] + ab * side[2])
     gb = (ab * axis[0] + bb * side[0], ab * axis[1] + bb * side[1], ab * axis[2] + bb * side[2])
-    na, nb = n * mu_a, n * mu_l
-    D = (
-        na * axis[0] * ga[0] + nb * side[0] * gb[0], na * axis[0] * ga[1] + nb * side[0] * gb[1], na * axis[0] * ga[2] + nb * side[0] * gb[2],
-        na * axis[1] * ga[0] + nb * side[1] * gb[0], na * axis[1] * ga[1] + nb * side[1] * gb[1], na * axis[1] * ga[2] + nb * side[1] * gb[2],
-        na * axis[2] * ga[0] + nb * side[2] * gb[0], na * axis[2] * ga[1] + nb * side[2] * gb[1], na * axis[2] * ga[2] + nb * side[2] * gb[2],
-    )  # fmt: skip
+    D = madd(outer(scale(n * mu_a, axis), ga), outer(scale(n * mu_l, side), gb))
     return (N * g[0], N * g[1], N * g[2]), g, D, left
 
 

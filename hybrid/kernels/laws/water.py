@@ -87,6 +87,7 @@ from hybrid.kernels.algebra.rotations import (
     outer,
     project,
     scale,
+    stack,
     sub,
 )
 from hybrid.kernels.laws.element import Chord, chord
@@ -347,21 +348,21 @@ def half_cell_drag(u, d, il, cn, ct):
     x, y, z = c2 * un[0], c2 * un[1], c2 * un[2]
     dx, dy, dz = c3 * d[0], c3 * d[1], c3 * d[2]
     xy, xz, yz = x * un[1] + dx * d[1], x * un[2] + dx * d[2], y * un[2] + dy * d[2]
-    B = (
-        c1 + x * un[0] + dx * d[0], xy, xz,
-        xy, c1 + y * un[1] + dy * d[1], yz,
-        xz, yz, c1 + z * un[2] + dz * d[2],
-    )  # fmt: skip
+    B = stack(
+        (c1 + x * un[0] + dx * d[0], xy, xz),
+        (xy, c1 + y * un[1] + dy * d[1], yz),
+        (xz, yz, c1 + z * un[2] + dz * d[2]),
+    )
 
     # df/de = (1/l) { cn [|un| (d un^T + ut P) + (ut/|un|) un un^T] - ct [2 |ut| d un^T + |ut| ut P] }
     b1, b2, b3 = il * (p * ut - q), il * (p - 2.0 * ct * a), il * cn * ut * i
     x, y, z = b2 * un[0] - b1 * d[0], b2 * un[1] - b1 * d[1], b2 * un[2] - b1 * d[2]  # beside d
     ux, uy, uz = b3 * un[0], b3 * un[1], b3 * un[2]
-    L = (
-        b1 + d[0] * x + ux * un[0], d[0] * y + ux * un[1], d[0] * z + ux * un[2],
-        d[1] * x + uy * un[0], b1 + d[1] * y + uy * un[1], d[1] * z + uy * un[2],
-        d[2] * x + uz * un[0], d[2] * y + uz * un[1], b1 + d[2] * z + uz * un[2],
-    )  # fmt: skip
+    L = stack(
+        (b1 + d[0] * x + ux * un[0], d[0] * y + ux * un[1], d[0] * z + ux * un[2]),
+        (d[1] * x + uy * un[0], b1 + d[1] * y + uy * un[1], d[1] * z + uy * un[2]),
+        (d[2] * x + uz * un[0], d[2] * y + uz * un[1], b1 + d[2] * z + uz * un[2]),
+    )
     return f, B, L
 
 
@@ -378,11 +379,11 @@ def half_cell_added_mass(vd, d, il, an, at, ca):
     b = il * (an - at)
     bt = b * t
     x, y, z = b * n[0] - bt * d[0], b * n[1] - bt * d[1], b * n[2] - bt * d[2]
-    L = (
-        bt + d[0] * x, d[0] * y, d[0] * z,
-        d[1] * x, bt + d[1] * y, d[1] * z,
-        d[2] * x, d[2] * y, bt + d[2] * z,
-    )  # fmt: skip
+    L = stack(
+        (bt + d[0] * x, d[0] * y, d[0] * z),
+        (d[1] * x, bt + d[1] * y, d[1] * z),
+        (d[2] * x, d[2] * y, bt + d[2] * z),
+    )
     return f, D, L
 
 
@@ -392,11 +393,11 @@ def body_drag(u, c):
     s = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
     q = -c / s if s.real > 0.0 else 0.0 * s
     f, p = body(u, s, c)
-    return f, (
-        p + q * u[0] * u[0], q * u[0] * u[1], q * u[0] * u[2],
-        q * u[1] * u[0], p + q * u[1] * u[1], q * u[1] * u[2],
-        q * u[2] * u[0], q * u[2] * u[1], p + q * u[2] * u[2],
-    )  # fmt: skip
+    return f, stack(
+        (p + q * u[0] * u[0], q * u[0] * u[1], q * u[0] * u[2]),
+        (q * u[1] * u[0], p + q * u[1] * u[1], q * u[1] * u[2]),
+        (q * u[2] * u[0], q * u[2] * u[1], p + q * u[2] * u[2]),
+    )
 
 
 # Columns of a piece; places and directions in axes of the body, motion of the water.

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import NamedNumbers
 
+Numbers = NDArray[np.int64]
+
 
 class Table:
     """The arguments of one kernel, by the names of its NamedTuple; `numbers` is what the kernel gets."""
@@ -135,10 +137,7 @@ class Series:
             tables[:, self._at[name]] += np.arange(count) * values.strides[0]
         return tables
 
-    def shift(
-        self, tables: NDArray[np.int64], arrays: Mapping[str, NDArray[Any]], begin: NDArray[np.int64],
-        count: NDArray[np.int64],
-    ) -> None:  # fmt: skip
+    def shift(self, tables: Numbers, arrays: Mapping[str, NDArray[Any]], begin: Numbers, count: Numbers) -> None:
         """Of arrays by name each table has `count` rows from row `begin` on; the first has those of row 0 on."""
         for name, values in arrays.items():
             at = self._at[name]

@@ -23,9 +23,8 @@ from hybrid.kernels.machine.linked_code import Code
 # numba's "contract" lets a*b+c become one fused instruction; no other relaxation is
 # allowed: NaN must stay visible and the order of sums must stay as written.
 # Kernels release the GIL: runs in threads of one process share no array that they write.
-_OPTIONS: dict[str, Any] = {
-    "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False, "no_cfunc_wrapper": True, "nogil": True,
-}  # fmt: skip
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
+_OPTIONS |= {"no_cfunc_wrapper": True, "nogil": True}
 _njit: Any = numba.njit  # its type knows of fewer options than it takes
 
 
@@ -180,11 +179,10 @@ def _link(code: Any, module: Any) -> None:
 
 
 # What kernels have nothing for: contexts, functions that are defined or inlined within them, literal_unroll and literally.
-_IDLE = (
-    untyped_passes.WithLifting, untyped_passes.MakeFunctionToJitFunction, untyped_passes.InlineInlinables,
-    untyped_passes.FindLiterallyCalls, untyped_passes.LiteralUnroll, untyped_passes.LiteralPropagationSubPipelinePass,
-    typed_passes.InlineOverloads,
-)  # fmt: skip
+_IDLE: tuple[Any, ...]
+_IDLE = (untyped_passes.WithLifting, untyped_passes.MakeFunctionToJitFunction, untyped_passes.InlineInlinables)
+_IDLE += (untyped_passes.FindLiterallyCalls, untyped_passes.LiteralUnroll, typed_passes.InlineOverloads)
+_IDLE += (untyped_passes.LiteralPropagationSubPipelinePass,)
 
 
 class _EntryCompiler(Compiler):

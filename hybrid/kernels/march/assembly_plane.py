@@ -218,8 +218,8 @@ def cell_force(line, state, i, cell, here, there, bent, rates, work):
         x = il * (there.M - here.M)
         f = (f[0] - x * m[0], f[1] - x * m[1])
         y = il * x
-        N0 = madd2(N0, (-2.0 * y * d[0] * d[1], y * (d[0] * d[0] - d[1] * d[1]),
-                        y * (d[0] * d[0] - d[1] * d[1]), 2.0 * y * d[0] * d[1]))  # fmt: skip
+        p, q = -2.0 * y * d[0] * d[1], y * (d[0] * d[0] - d[1] * d[1])
+        N0 = madd2(N0, (p, q, q, 2.0 * y * d[0] * d[1]))
         N0 = madd2(N0, outer2(il, m, (there.B[0] + here.A[0], there.B[1] + here.A[1])))
         Nm, Np = outer2(-il, m, here.B), outer2(-il, m, there.A)
         if line.bits & ROTARY:

@@ -407,11 +407,9 @@ def torsion_of(line: Line, keep: bool) -> Torsion:
     unknowns, z = zones + floating.size, np.zeros
     passed = z((2, n))
     passed[HOLD, floating] = 1.0 / line.torsion[:, COMPLIANCE].min()
-    return Torsion(
-        passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
-        columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), right=z((n + 1, SIZE)),
-        coupling=z((unknowns, unknowns)), dense=z((unknowns + 5, unknowns + 1)),
-    )  # fmt: skip
+    answers = z((unknowns, n + 1, SIZE)), np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), z((n + 1, SIZE))
+    equations = z((unknowns, unknowns)), z((unknowns + 5, unknowns + 1))
+    return Torsion(passed, z((n, 3)), z((zones, 2, 3)), floating, *answers, *equations)
 
 
 def answers_of(torsion: Torsion) -> dict[str, Floats]:

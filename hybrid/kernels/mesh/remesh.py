@@ -421,10 +421,8 @@ class Cable(NamedTuple):
 def blank_cable(n: int) -> Cable:
     """A cable of nothing on n base cells."""
     z, points = np.zeros, len(OF_POINTS)
-    return Cable(
-        z((n, COLUMNS)), z(n), z(n), z((points, n + 1)), z(points), z(n + 1, np.int8), z(n + 1, np.int8),
-        z((2, 2), np.int8), np.full(2, np.inf),
-    )  # fmt: skip
+    load, turns, held, springs = z(n + 1, np.int8), z(n + 1, np.int8), z((2, 2), np.int8), np.full(2, np.inf)
+    return Cable(z((n, COLUMNS)), z(n), z(n), z((points, n + 1)), z(points), load, turns, held, springs)
 
 
 by_reference(blank_cable(1))

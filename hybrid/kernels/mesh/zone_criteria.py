@@ -200,10 +200,9 @@ class NodeKinds(NamedTuple):
 def blank_kinds(cells: int, base: int) -> NodeKinds:
     """Room for what criteria know of a line of so many cells and base cells."""
     z, nodes = np.zeros, cells + 1
-    return NodeKinds(
-        z(nodes), z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8),
-        z(nodes), z(nodes), z(nodes), z(nodes),
-    )  # fmt: skip
+    node, base_of_cell, free = z(nodes, np.int8), z(cells, np.int64), z(base, np.int8)
+    (EI, GJ, w, bent), (turn, twisting, twist, curvature) = z((4, nodes)), z((4, nodes))
+    return NodeKinds(EI, GJ, w, bent, node, z(nodes), base_of_cell, free, turn, twisting, twist, curvature)
 
 
 @inner

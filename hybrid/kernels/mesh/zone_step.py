@@ -7,7 +7,7 @@ the same functions where a criterion or joints of its own take part (zones.chang
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,18 +157,19 @@ class Zones(NamedTuple):
 def blank_zones(cells: int, base: int) -> Zones:
     """Zones of a line of so many cells and base cells, all catenary."""
     z, nodes = np.zeros, cells + 1
-    return Zones(
-        clock=ZoneClock(fineness=1.0), counts=ZoneFlags(),
-        kinds=blank_kinds(cells, base),
-        clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
-        asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
-        ramp_factor=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
-        here=z(base + 1, bool), plan=z(base + 1, bool), idle_steps=z(base + 1, np.int64),
-        waves=z(base + 1), place=z(nodes, np.int64),
-        wanted=z(nodes), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
-        rate=z(cells), since=np.full(cells, -np.inf), keeps=z(cells, bool), strain=z((2, nodes, 3)),
-        moment=z((nodes, 3)), energy=z(4),
-    )  # fmt: skip
+    shapes: dict[str, Any] = {"clamped": 2, "tangents": (2, 3), "moments": (2, 3), "waves": base + 1}
+    shapes |= {"strain": (2, nodes, 3), "moment": (nodes, 3), "stiff": (nodes, 3), "energy": 4}
+    shapes |= {"ratios": (len(CRITERIA), base)} | dict.fromkeys(("asked", "largest", "shares", "limits"), QUANTITIES)
+    shapes |= dict.fromkeys(("grown", "ramp_factor", "H"), base) | {"wanted": nodes, "share": nodes}
+    shapes |= dict.fromkeys(("past", "recent", "true", "lengths", "lack", "rate", "since"), cells)
+    real: dict[str, Any] = {name: z(shape) for name, shape in shapes.items()}
+    for name, value in {"grown": 1.0, "ramp_factor": 1.0, "H": 1.0, "since": -np.inf}.items():
+        real[name][:] = value
+    flags: dict[str, Any] = {name: z(base, bool) for name in ("rod", "leaving", "next_rod")}
+    flags |= {"here": z(base + 1, bool), "plan": z(base + 1, bool), "keeps": z(cells, bool)}
+    clock, kinds, idle = ZoneClock(fineness=1.0), blank_kinds(cells, base), z(base + 1, np.int64)
+    whole: dict[str, Any] = {"parts": np.ones(base, np.int64), "idle_steps": idle, "place": z(nodes, np.int64)}
+    return Zones(clock, ZoneFlags(), kinds, **real, **flags, **whole)
 
 
 by_reference(blank_zones(1, 1))

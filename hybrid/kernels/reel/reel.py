@@ -300,26 +300,23 @@ class Reel(NamedTuple):
 
 
 def blank_reel(
-    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Winch | None = None,
-    layer: Floats | None = None, columns: bool = False, damped: bool = False, slips: int = 0,
-) -> Reel:  # fmt: skip
+    cells: int, law: Floats, pieces: Floats, winch: Winch, layer: Floats, columns: bool, damped: bool, slips: int = 0
+) -> Reel:
     """A reel of a line of so many cells.
 
     columns: whether such a winch needs another right-hand side; damped: see `flow`; slips: layers that do.
     """
-    z = np.zeros
-    numbers = ReelNumbers(changed=-np.inf)
-    return Reel(
-        numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
-        z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 10)),
-        z(3), z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
-        z((1 if layer is None else layer.size, 3)), ReelStage(), z((cells + 1, 3)), z((cells + 1, 3)), Winch() if winch is None else winch,
-        z((cells + 1 if damped else 0, FLOWS)), z((3, cells + 1, 5) if columns else (3, 0, 5)),
-        z((cells + 2 if slips else 0, 1 + 4 * slips)), z(2),
-    )  # fmt: skip
+    z, n = np.zeros, cells + 1
+    lengths = z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((n, 10))
+    riding = layer, z((layer.size, 3)), ReelStage(), z((n, 3)), z((n, 3)), winch
+    flow = z((n if damped else 0, FLOWS)), z((3, n, 5) if columns else (3, 0, 5))
+    reports = z(3), z(REPORT_SIZE), z((2, COLUMNS))
+    volumes = z((n + 1 if slips else 0, 1 + 4 * slips))
+    given = ReelNumbers(changed=-np.inf), law, pieces
+    return Reel(*(*given, *lengths, *reports, *riding, *flow, volumes, z(2)))
 
 
-by_reference(blank_reel(1))
+by_reference(blank_reel(1, np.zeros((1, 8)), np.zeros((1, 1 + COLUMNS)), Winch(), np.zeros(1), False, False))
 
 
 class MovingZones(NamedTuple):

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
-from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK, read_members
+from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, read_members
 from hybrid.kernels.junctions.borders import is_grouped_otherwise, is_touched_alone, read_network
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.energies import pull
-from hybrid.kernels.run.network import BODY_SAMPLE, error_ratio, is_due, keep_bodies, sample_now, sample_within
+from hybrid.kernels.run.network import error_ratio, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.state.books import (
     ASK_BEFORE,
     ASK_STEPS,
@@ -33,7 +33,6 @@ from hybrid.kernels.state.books import (
     IS_BENT,
     JUDGE,
     LINES_NEAR,
-    LOG,
     MEETS_ITSELF,
     NEARS_ITSELF,
     NODES_DUE,
@@ -50,7 +49,7 @@ from hybrid.kernels.state.books import (
     Counts,
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST_CELL, USED_RHO
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.accept import note_cuts, renew_accelerations, watch_push
 from hybrid.kernels.step.line_step import (
     CUT_SHORT,
@@ -82,14 +81,13 @@ OF_REACH, OF_ITERATIONS, OF_ARM, OF_TOLERANCE = range(4)
 class StepsJob(NamedTuple):
     """Arguments of the entry."""
 
-    even: NDArray[
-        np.int64
-    ]  # of a kernels.run.network.NetworkJob that leads from the states of even parity to the others
+    # of a kernels.run.network.NetworkJob that leads from the states of even parity to the others
+    even: NDArray[np.int64]
     odd: NDArray[np.int64]  # and of one that leads back
     joined_even: NDArray[np.int64]  # the same of the lines that are joined to what moves with them
     joined_odd: NDArray[np.int64]
     joined: NDArray[np.int64]  # (J,) their numbers
-    lone: NDArray[np.int64]  # (L - J, ..) jobs of the others, their task RUN
+    lone: NumberRows  # (L - J, ..) jobs of the others, their task RUN
     lone_lines: NDArray[np.int64]  # (L - J,) and their numbers
     marchers: NDArray[np.int64]  # (L - J,) addresses of the kernels that solve their steps
     clock: Clock  # of all lines
@@ -97,23 +95,23 @@ class StepsJob(NamedTuple):
     limits: Floats  # (4,) above
     lines: NDArray[np.int64]  # (4,) above
     seen: NDArray[np.int64]  # (L,) bits of kernels.state.books: how near a line came to itself in the last step
-    log: Floats  # (rows, L, len(LOG))
-    loads: Floats  # (K, 8) as kernels.state.state.Moves.loads, of the bodies of which one grows or follows a table
-    history: Floats  # (H, 4) likewise
+    log: Blocks  # (rows, L, len(LOG))
+    loads: Rows  # (K, 8) as kernels.state.state.Moves.loads, of the bodies of which one grows or follows a table
+    history: Rows  # (H, 4) likewise
     outputs: Floats  # s, times of all outputs
-    bodies: Floats  # (rows, B, BODY_SAMPLE) samples of bodies; those of lines are in their books
-    worked: Floats  # (3, B, WORK) of bodies: now, before the last step, before the step before
-    members: NDArray[np.int64]  # (M, ..) tables of kernels.junctions.bodies.MembersJob, of bodies with members
+    bodies: Blocks  # (rows, B, BODY_SAMPLE) samples of bodies; those of lines are in their books
+    worked: Blocks  # (3, B, WORK) of bodies: now, before the last step, before the step before
+    members: NumberRows  # (M, ..) tables of kernels.junctions.bodies.MembersJob, of bodies with members
     with_members: NDArray[np.int64]  # (M,) and which bodies these are
     watched_even: NDArray[np.int64]  # of a kernels.contact.lines_distance.LinesJob, after a step of `even`
     watched_odd: NDArray[np.int64]
-    followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
+    followed: NumberRows  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
     due: NDArray[np.int64]  # (Z,) whether they ask for something after the last step
-    changed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.remesh.RemeshJob, of lines whose cells follow
+    changed: NumberRows  # (Z, ..) tables of kernels.mesh.remesh.RemeshJob, of lines whose cells follow
     changes: NDArray[np.int64]  # (Z,) 1 where there is one
-    paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
+    paid: NumberRows  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
     nodes_due: NDArray[np.int64]  # (W,) whether a node is to enter or leave there after the last step
-    reeled: NDArray[np.int64]  # (W, ..) tables of kernels.mesh.remesh.RemeshJob, of lines where that needs no Python
+    reeled: NumberRows  # (W, ..) tables of kernels.mesh.remesh.RemeshJob, of lines where that needs no Python
     reels: NDArray[np.int64]  # (W,) 1 where there is one
     beside: NDArray[np.int64]  # of a kernels.run.network_tangents.NetworkTangents
     solver: int = 0  # address of kernels.run.newton.solve_network
@@ -133,23 +131,7 @@ class StepsJob(NamedTuple):
     tangents: int = 0  # of kernels.run.network_tangents.advance_joined; 0: none are followed
 
 
-def no_loads() -> tuple[Floats, Floats]:
-    """StepsJob.loads and history where none changes."""
-    return np.zeros((0, 8)), np.zeros((0, 4))
-
-
-def blank_steps_job() -> StepsJob:
-    """A job with the types that every one has."""
-    none, log = np.zeros(1, np.int64), np.zeros((1, 1, len(LOG)))
-    clock, counts = Clock(), Counts()
-    lone = np.zeros((1, 1), np.int64)
-    return StepsJob(
-        none, none, none, none, none, lone, none, none, clock, counts, np.zeros(4), none, none, log, *no_loads(),
-        np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
-        none, none, lone, none, lone, none, lone, none, lone, none, none,
-    )  # fmt: skip
-
-
+blank_steps_job = blanks(StepsJob)
 read_steps = reader(blank_steps_job())
 call_step, call_book = caller((0, 0, 0.0, 0, 0)), caller(0)
 call_sample, call_stir, call_watch = caller(0), caller(0), caller(0)

@@ -209,9 +209,8 @@ def put_bodies(network, other):
     """Where the other bodies stand: those of the run and h times the tangents."""
     h = other.h
     for b in range(other.rates.shape[0]):
-        x, y, here, there, z, own = (
-            other.before[b], other.rates[b], network.new[b], other.new[b], network.work[b], other.work[b],
-        )  # fmt: skip
+        x, y, here, there = other.before[b], other.rates[b], network.new[b], other.new[b]
+        z, own = network.work[b], other.work[b]
         for k in range(3):
             there[PLACE + k] = here[PLACE + k] + h * y[k]
             for o, rate in ((V, V_OF), (A, A_OF), (VD, VD_OF), (W, W_OF), (WA, WA_OF), (WD, WD_OF)):

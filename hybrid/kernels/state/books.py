@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,9 +149,8 @@ WORST = 3
 # Bits of `marks`: what a node has.
 LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
 # Rows of `extremes`.
-(
-    TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES, OBSTACLE_PRESSURE,
-) = range(10)  # fmt: skip
+TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE = range(5)
+DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES, OBSTACLE_PRESSURE = range(5, 10)
 EXTREMES = 10
 STRAINS = 8  # columns of `strains`
 
@@ -236,11 +235,11 @@ def sample_size(
 def blank_books(cells: int = 1, rows: int = 1) -> Books:
     """Books of a line of so many cells, with room for so many rows of log and samples, extremes unwanted."""
     z, nodes = np.zeros, cells + 1
-    return Books(
-        clock=Clock(), counts=Counts(), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
-        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((3, 3)), base=z(0, np.int64), placed=z((0, 3)),
-        borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
-        samples=z((rows, sample_size(cells))), strains=z((0, STRAINS)), start=z((nodes, 3)), marks=z(nodes, np.int8),
-        right=np.arange(nodes),
-        extremes=z((4, 0, nodes)), touch=z((3, 0)), asked=z((0, 0)), reached=z((0, 0)), path=z((0, 0)), radii=z((0, 2)), walls=z((0, 0)),
-    )  # fmt: skip
+    shapes: dict[str, Any] = {"power": (2, RATES), "work": (2, WORKS), "report": (3, REPORT_SIZE), "outputs": 0}
+    shapes |= {"tension": (2, cells), "twist": (2, 2), "velocity": (2, 3), "imposed": (2, 2, 21), "hinges": (3, 3)}
+    shapes |= {"placed": (0, 3), "worst": (WORST, 4), "log": (rows, len(LOG)), "samples": (rows, sample_size(cells))}
+    shapes |= {"strains": (0, STRAINS), "start": (nodes, 3), "extremes": (4, 0, nodes), "touch": (3, 0)}
+    shapes |= dict.fromkeys(("asked", "reached", "path", "walls"), (0, 0)) | {"radii": (0, 2)}
+    arrays: dict[str, Any] = {name: z(shape) for name, shape in shapes.items()}
+    arrays |= {"borne": np.full(cells, np.inf), "right": np.arange(nodes), "base": z(0, np.int64)}
+    return Books(Clock(), Counts(), loaded=z(2, np.int8), marks=z(nodes, np.int8), **arrays)

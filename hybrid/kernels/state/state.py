@@ -373,16 +373,11 @@ def batch_of_one(
 
     touch: (N+1,) N/m, force of the line on itself; None: it does not touch itself.
     """
-    now = State(*(x[None].copy() for x in state))
-    return Batch(
-        np.array([t]), now.r, now.v, now.vd, now.e, now.T, now.a1, now.w, ends.held[None].copy(),
-        ends.position[None].copy(), ends.frame[None].copy(), ends.spin[None].copy(), ends.force[None].copy(),
-        ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(), turn=now.turn,
-        **{} if touch is None else {"touch": touch[None].copy()},
-        **{} if not state.grip.size else {"obstacles": obstacles_now(sea, state)[None]},
-        **{} if not state.layers.size else {"layers": now.layers},
-        **{} if not state.soil.size else {"soil": now.soil},
-    )  # fmt: skip
+    known = state._asdict() | ends._asdict() | {"report": report, "work": work, "sea_now": sea.now}
+    known |= {} if touch is None else {"touch": touch}
+    now = {x: known[x][None].copy() for x in Batch._fields if x in known and (known[x].size or x == "turn")}
+    now |= {"obstacles": obstacles_now(sea, state)[None]} if state.grip.size else {}
+    return Batch(t=np.array([t]), **now)
 
 
 def obstacles_now(sea: Sea, state: State) -> Floats:
@@ -462,49 +457,34 @@ def no_torsion() -> Torsion:
 
 
 def blank_state(
-    n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0,
-    sheaves: bool = False, peak: bool = False, layers: int = 0, soil: bool = False,
-) -> State:  # fmt: skip
+    n_cells: int,
+    zones: int = 0,
+    slow: bool = False,
+    wake: bool = False,
+    obstacles: int = 0,
+    sheaves: bool = False,
+    peak: bool = False,
+    layers: int = 0,
+    soil: bool = False,
+) -> State:
     """A state of zeros with room for `n_cells` cells.
 
     zones: those that a torque passes through; slow: mean tensions; wake: phases of vortices; obstacles: of which one
     moves; sheaves: one of them turns freely; peak: highest mean tensions; layers: that slip; soil: what nodes remember
     of the bed.
     """
-    node, cell = (n_cells + 1, 3), (n_cells, 3)
-    z = np.zeros
-    w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
-    return State(
-        z(node),
-        z(node),
-        z(node),
-        z(node),
-        z(cell),
-        z(n_cells),
-        z(cell),
-        w,
-        wa,
-        wd,
-        z(node),
-        z(node),
-        z((zones, 3)),
-        z(n_cells if slow else 0),
-        z((n_cells + 1 if wake else 0, 4)),
-        z((n_cells + 1 if obstacles else 0, 6 * obstacles)),
-        z((obstacles if sheaves else 0, 4)),
-        z(n_cells if peak else 0),
-        z((n_cells + 1 if layers else 0, 2 * layers)),
-        z((n_cells + 1 if soil else 0, NO_SOIL.shape[1])),
-    )
+    n, node, cell = n_cells, (n_cells + 1, 3), (n_cells, 3)
+    shapes: list[Any] = [node, node, node, node, cell, n, cell, n, n, n, node, node, (zones, 3)]
+    shapes += [n if slow else 0, (n + 1 if wake else 0, 4), (n + 1 if obstacles else 0, 6 * obstacles)]
+    shapes += [(obstacles if sheaves else 0, 4), n if peak else 0, (n + 1 if layers else 0, 2 * layers)]
+    return State(*map(np.zeros, [*shapes, (n + 1 if soil else 0, NO_SOIL.shape[1])]))
 
 
 def state_for(line: Line) -> State:
     """A state of zeros of a line."""
-    free, peak = bool((line.moved == FREE).any()), remembers(line)
-    return blank_state(
-        line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free, peak,
-        slip_size(line) // 2, bool(line.bits & REMEMBERS),
-    )  # fmt: skip
+    free, peak, soil = bool((line.moved == FREE).any()), remembers(line), bool(line.bits & REMEMBERS)
+    slow, wake, layers = line.law.size > 0, line.wake_law.size > 0, slip_size(line) // 2
+    return blank_state(line.h.size, len(line.torsion), slow, wake, line.moved.size, free, peak, layers, soil)
 
 
 def sampled_size(line: Line) -> int:
@@ -524,13 +504,11 @@ def remembers(line: Line) -> bool:
 
 def no_sea(n_cells: int) -> Sea:
     """Nothing around a line of `n_cells` cells: no current but zero, no waves, no seabed."""
-    node, nan = (n_cells + 1, 3), float("nan")
-    return Sea(
-        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), np.zeros(0), nan, nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
-        np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
-        NO_OBSTACLES, np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
-        NO_MOVES, NO_CARRIED, NO_GRIP, NO_ROOM,
-    )  # fmt: skip
+    z, node, nan = np.zeros, (n_cells + 1, 3), float("nan")
+    waves = z((0, 6)), z(0), nan, nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), z(2)
+    bed = np.array([0.0, 0.0, 1.0]), nan, z(0), z(0), z((0, 4)), nan, nan, nan, np.full(2, nan), nan
+    room = z((n_cells + 1, 7)), z((10, LANES)), z(node), z(node), z(node), z(node)
+    return Sea(*(z(1), z((1, 3)), *waves, *bed, NO_OBSTACLES, *room, NO_MOVES, NO_CARRIED, NO_GRIP, NO_ROOM))
 
 
 def with_waves(sea: Sea, waves: Floats, depth: float, orbits: Floats | None = None) -> Sea:
@@ -566,11 +544,9 @@ def no_ends() -> Ends:
 def no_moves(n: int = 2) -> Moves:
     """Both ends, or n obstacles, at the origin, not moved, not loaded."""
     z = np.zeros
-    return Moves(
-        z((n, 2), np.int8), z((n, 3)), z((n, 9)), z(n), z((0, 5)), z((n, 3)), z(n), z((n, 5)), z(n, np.int8),
-        z((n, 2), np.int64), z(0), z((0, 6, 4)), z((n, 4)), 1.0, z((n, 2), np.int8), z((n, 26)), z((0, 8)), z((0, 4)),
-        z((n, FAIRLEAD)),
-    )  # fmt: skip
+    still = z((n, 2), np.int8), z((n, 3)), z((n, 9)), z(n), z((0, 5)), z((n, 3)), z(n), z((n, 5)), z(n, np.int8)
+    files = z((n, 2), np.int64), z(0), z((0, 6, 4)), z((n, 4)), 1.0
+    return Moves(*still, *files, z((n, 2), np.int8), z((n, 26)), z((0, 8)), z((0, 4)), z((n, FAIRLEAD)))
 
 
 NO_MOVES = no_moves(0)

@@ -190,13 +190,10 @@ class Job(NamedTuple):
 
 def blank_job() -> Job:
     """A job of one cell with the types that every job has."""
-    state = blank_state(1)
-    limits, none = Limits(1.0, 1.0, 1), np.zeros((0, 4))
-    task = Task(0, limits=limits)
-    return Job(
-        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
-        np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
-    )  # fmt: skip
+    limits, none, state = Limits(1.0, 1.0, 1), np.zeros((0, 4)), blank_state(1)
+    tables = np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
+    line = Task(0, limits=limits), blank_line(1), no_sea(1), no_ends(), no_moves()
+    return Job(*line, state, state, none, none, no_work(), blank_books(), *tables)
 
 
 read = reader(blank_job())

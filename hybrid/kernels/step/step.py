@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import ROW
 from hybrid.kernels.algebra.plane import KEPT, TRIPLE
-from hybrid.kernels.algebra.rotations import dot, get3, spin_about, sub
+from hybrid.kernels.algebra.rotations import add, dot, get3, scale, spin_about, sub
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.obstacle_grip import (
     book_obstacles,
@@ -194,8 +194,7 @@ def contact_work(line, sea, old, new, u, report):
         grip_obstacles(line, sea, u, new, sea.grip, new.grip)
         book_obstacles(sea, old, new, u, report)
     for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
-        b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
-             0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
+        b = scale(0.5, add(get3(old.bed, i), get3(sea.bed, i)))
         if moves:  # what is left is the bed's
             for k in range(line.moved.shape[0]):
                 b = sub(b, mean_force(old, new, i, EACH * k))

@@ -156,10 +156,8 @@ def observe_pipes(walls, sections, z, T, bend, force, stress):
 
 
 # Kinds, by their names in a scene (scene.quantities.KINDS).
-(
-    HORIZONTAL_FORCE, VERTICAL_FORCE, FORCE_ALONG, DECLINATION, AZIMUTH, END_ANGLE, UPLIFT, UPLIFT_ANGLE, TOUCHDOWN,
-    TOUCHDOWN_EXCURSION, LAYBACK, CLEARANCE,
-) = range(12)  # fmt: skip
+HORIZONTAL_FORCE, VERTICAL_FORCE, FORCE_ALONG, DECLINATION, AZIMUTH, END_ANGLE = range(6)
+UPLIFT, UPLIFT_ANGLE, TOUCHDOWN, TOUCHDOWN_EXCURSION, LAYBACK, CLEARANCE = range(6, 12)
 CHORDS = 12  # none of a scene: chords of a line for another one
 # Columns of `asked`.
 KIND = 0

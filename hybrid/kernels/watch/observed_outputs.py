@@ -55,9 +55,9 @@ from hybrid.kernels.state.state import (
     Ends,
     Floats,
     Line,
+    Rows,
     Sea,
-    blank_line,
-    no_ends,
+    blanks,
 )
 from hybrid.kernels.watch.extremes import borne, node_pressure
 from hybrid.kernels.watch.named_quantities import touch_at
@@ -376,36 +376,29 @@ class Output(NamedTuple):
 
     line: Line
     ends: Ends
-    r: Floats  # (N+1, 3) m
-    e: Floats  # (N, 3) m
-    v: Floats  # (N+1, 3) m/s
-    a1: Floats  # (N, 3)
+    r: Rows  # (N+1, 3) m
+    e: Rows  # (N, 3) m
+    v: Rows  # (N+1, 3) m/s
+    a1: Rows  # (N, 3)
     w: Floats  # (N,) 1/s
     T: Floats  # (N,) N
-    turn: Floats  # (K, 3) as `State.turn`
+    turn: Rows  # (K, 3) as `State.turn`
     report: Floats  # as of a step
     loaded: NDArray[np.int8]  # (2,) whether a load is at the end
-    hinges: Floats  # as of `Books`
+    hinges: Rows  # as of `Books`
     marks: NDArray[np.int8]  # (N+1,) of nodes with two sides, as of `Books`
-    strains: Floats  # (N+1, STRAINS) as of `Books`
-    moment: Floats  # (N+1, 3) N m, as of kernels.march.energies
-    strain: Floats  # (N+1, 3) rad
+    strains: Rows  # (N+1, STRAINS) as of `Books`
+    moment: Rows  # (N+1, 3) N m, as of kernels.march.energies
+    strain: Rows  # (N+1, 3) rad
     energy: Floats  # (5,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy)
     bend: Floats  # (N+1,) 1/m, from cell to cell, inside the line; empty: not asked for
     held: Floats  # (N+2,) N, tension at the start, of the cells, at the end
-    sides: Floats  # (n sides, SIDE)
-    bed: Floats  # (N+1, ON_BED)
+    sides: Rows  # (n sides, SIDE)
+    bed: Rows  # (N+1, ON_BED)
     touch: Floats  # (TOUCH,)
 
 
-def _blank() -> Output:
-    z, nodes, cells, marks = np.zeros, np.zeros((2, 3)), np.zeros((1, 3)), np.zeros(2, np.int8)
-    return Output(
-        blank_line(1), no_ends(), nodes, cells, nodes, cells, z(1), z(1), NO_TURN, z(1), marks, z((3, 3)), marks,
-        z((2, STRAINS)), nodes, nodes, z(5), z(2), z(3), z((2, SIDE)), z((2, ON_BED)), z(TOUCH),
-    )  # fmt: skip
-
-
+_blank = blanks(Output)
 _read, _series = reader(_blank()), Series(_blank())
 
 
@@ -676,10 +669,8 @@ def observed_joined(
     held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
     own = found | {name: x for name, x in cut.items() if "." not in name} | {name: x[0] for name, x in each.items()}
     own |= {"held": found["held"][: nodes + 1], "sides": found["sides"][: rows[1]], "report": batch.report[0]}
-    first = Output(
-        line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}), Ends(*(x[0] for x in held)), turn=NO_TURN,
-        hinges=what.hinges, loaded=what.loaded, **own,
-    )  # fmt: skip
+    there, held_there = line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}), Ends(*(x[0] for x in held))
+    first = Output(there, held_there, turn=NO_TURN, hinges=what.hinges, loaded=what.loaded, **own)
     along = each | {"report": batch.report} | {f"ends.{name}": x for name, x in held._asdict().items()}
     tables = _series(first, nb, along)
     _series.shift(tables, on_nodes, begin[:-1], np.diff(begin))
