@@ -193,13 +193,11 @@ ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
 # All kinds that are part of a normal run: changes of zones, what `resume`, `release_at`, `ramp` or `contact` asks for.
 EXPECTED = (*ZONE_EVENTS, "loads change", "end released", "motion blended in", "lines touch")
 # Kinds that, noted at t = 0, are of the whole run and not of its start.
-OF_THE_RUN = frozenset({
-    "implausible", "accuracy missed", "no error figure", "error uncertain", "several equilibria", "not converged",
-    "largest force uncertain", "windows uncertain", "irregular motion", "snaps", "costly accuracy",
-    "finer run not kept", "torque neglected", "ignored", "undamped", "model error not estimated", "zones fixed",
-    "static friction neglected",
-    "numerical dissipation", "model chosen", "laid one way", "slack line as rods",
-})  # fmt: skip
+OF_THE_RUN = frozenset({"implausible", "accuracy missed", "no error figure", "error uncertain", "costly accuracy"})
+OF_THE_RUN |= {"largest force uncertain", "windows uncertain", "finer run not kept", "model error not estimated"}
+OF_THE_RUN |= {"several equilibria", "not converged", "irregular motion", "snaps", "laid one way"}
+OF_THE_RUN |= {"torque neglected", "static friction neglected", "ignored", "undamped", "zones fixed"}
+OF_THE_RUN |= {"numerical dissipation", "model chosen", "slack line as rods"}
 # How an event "ignored" begins that is about what an end bends the line by.
 OF_AN_END = "moment and tangent at ends."
 # Of an event "kink at joint": bends are too sharp by it, and not too mild.
@@ -280,9 +278,15 @@ class ComputationError(HybridError):
     """
 
     def __init__(
-        self, outcome: Outcome, t: float | None, s: float | None, detail: str = "", snapshot: Path | None = None,
-        first: str = "", line_name: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        outcome: Outcome,
+        t: float | None,
+        s: float | None,
+        detail: str = "",
+        snapshot: Path | None = None,
+        first: str = "",
+        line_name: str = "",
+    ) -> None:
         """first: to try before the remedy of the outcome."""
         self.line_name, self.first = line_name, first
         self.outcome, self.t, self.s, self.detail, self.snapshot = outcome, t, s, detail, snapshot

@@ -24,7 +24,6 @@ from hybrid.accuracy.run_forecast import Budget
 from hybrid.errors import ComputationError
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
-from hybrid.model.sections import OutputPoints
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.case import Case
 from hybrid.simulation.restart import resolution_from, resolution_tree
@@ -338,22 +337,20 @@ class ErrorController:
 
     def checkpoint(self) -> Tree:
         """What it has found until now, as named arrays and plain values."""
-        return {
-            "runs": np.array(self.runs), "next": self.next and _tree(self.next),
-            "first": self.first and _tree(self.first),
-            "budget": self.budget.checkpoint() if self.budget is not None else [], "notes": list(self.notes),
-            "touching": sorted(self._touching), "lines": {name: x.checkpoint() for name, x in self.lines.items()},
-        }  # fmt: skip
+        found: dict[str, Any] = {"runs": np.array(self.runs), "notes": list(self.notes)}
+        found |= {"next": self.next and _tree(self.next), "first": self.first and _tree(self.first)}
+        found |= {"budget": self.budget.checkpoint() if self.budget is not None else []}
+        return found | {"touching": sorted(self._touching), "lines": {k: x.checkpoint() for k, x in self.lines.items()}}
 
     def restore(
-        self, tree: Mapping[str, Any], scenes: Mapping[str, LineScene], points: Mapping[str, OutputPoints],
-        source: Path | None = None, kept: NetworkResolution | None = None,
-    ) -> None:  # fmt: skip
-        """Continue as `checkpoint` has said; scenes, points: of the lines, as of the result.
+        self, tree: Mapping[str, Any], source: Path | None = None, kept: NetworkResolution | None = None
+    ) -> None:
+        """Continue as `checkpoint` has said.
 
-        source: its file; kept: how finely it was computed.  Runs to compare with whose outputs are no longer beside it
-        are computed again.  ResultError or ValueError: it is none of this scene.
+        source: the file of the result; kept: how finely it was computed.  Runs to compare with whose outputs are no
+        longer beside it are computed again.  ResultError or ValueError: it is none of this scene.
         """
+        scenes, points = self.case.lines, self.case.points
         tree = _as_now(tree, scenes, kept)
         template: Tree = {"runs": np.zeros(0)}
         names = ("next", "first", "lines", "budget", "notes", "touching")

@@ -42,6 +42,7 @@ from hybrid.accuracy.error_order import (
     snap_times,
     steps_in_rise,
 )
+from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_sample import END_FORCES, RunSample
@@ -243,9 +244,12 @@ class StatisticEstimate(Estimate):
     @classmethod
     def restored(cls, tree: Any, scene: LineScene, shape: tuple[int, int, int]) -> Self:
         self = super().restored(tree, scene, shape)
-        self.chance = matched({"chance": np.zeros(2)} | {k: x for k, x in tree.items() if k == "chance"},
-                              {"chance": np.zeros(2)}, "statistics")["chance"]  # fmt: skip
+        found = {"chance": tree.get("chance", np.zeros(2))}
+        self.chance = matched(found, {"chance": np.zeros(2)}, "statistics")["chance"]
         return self
+
+
+Estimates = Mapping[str, StatisticEstimate]
 
 
 def estimates(
@@ -274,15 +278,14 @@ def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
     if len(run.forces) > windows:
         kept |= {"windows_largest": _of_windows(run.forces, windows, np.maximum)}
         kept |= {"windows_smallest": _of_windows(run.forces, windows, np.minimum)}
-    return {
-        statistic: replace(
-            run, every=1, rows={}, forces=kept[statistic], catenary=run.catenary[:0],
-            values={name: np.stack([x[k], 0.0 * x[k], 0.0 * x[k]], axis=-1) if name in END_FORCES else x[k]
-                    for name, x in found.items()},
-            model_error={name: x[k] for name, x in errors.items()},
-        )
-        for k, statistic in enumerate(STATISTICS)
-    }  # fmt: skip
+    out, plain = {}, replace(run, every=1, rows={}, catenary=run.catenary[:0])
+    for k, statistic in enumerate(STATISTICS):
+        each = {name: x[k] for name, x in found.items()}
+        for name in END_FORCES.keys() & each.keys():
+            each[name] = np.stack([each[name], 0.0 * each[name], 0.0 * each[name]], axis=-1)
+        model_error = {name: x[k] for name, x in errors.items()}
+        out[statistic] = replace(plain, forces=kept[statistic], values=each, model_error=model_error)
+    return out
 
 
 def _chance(after: RunSample, before: RunSample) -> np.ndarray:
@@ -296,7 +299,7 @@ def _chance(after: RunSample, before: RunSample) -> np.ndarray:
     return np.asarray(2.0 * np.std(differences, axis=0) / np.sqrt(len(differences)))
 
 
-def is_chance(found: Mapping[str, StatisticEstimate], statistic: str, quantity: str) -> bool:
+def is_chance(found: Estimates, statistic: str, quantity: str) -> bool:
     """Whether a statistic of an end force differs from that of the run before by no more than chance makes it differ.
 
     quantity: of END_FORCES, as runs call it.  Means over windows do where they differ by less than twice the standard
@@ -318,7 +321,7 @@ def _of_windows(forces: np.ndarray, windows: int, f: np.ufunc) -> np.ndarray:
     return np.column_stack([np.arange(float(len(begins))), f.reduceat(forces[:, 1:], begins, axis=0)])
 
 
-def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAccuracy) -> list[tuple[str, str]]:
+def windows_uncertain(found: Estimates, asked: RequestedAccuracy) -> list[tuple[str, str]]:
     """The event that says so where chance may take means over windows of an end force beyond what is asked."""
     if asked.tension is None and asked.of_end_force is None:
         return []
@@ -339,9 +342,8 @@ def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAc
 
 
 def irregular_notes(
-    found: Mapping[str, StatisticEstimate], errors: Errors, scattered: Sequence[str], excess: np.ndarray,
-    asked: RequestedAccuracy, by_snaps: bool,
-) -> list[tuple[str, str]]:  # fmt: skip
+    found: Estimates, errors: Errors, scattered: Sequence[str], excess: Floats, asked: RequestedAccuracy, by_snaps: bool
+) -> list[tuple[str, str]]:
     """What is judged of an irregular motion, and how far the result may be off in what is not.
 
     errors: at every output; scattered: end forces whose largest values are by chance; excess: (2,) N, by which snaps

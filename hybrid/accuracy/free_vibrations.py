@@ -41,9 +41,7 @@ from hybrid.scene.root import Scene
 from hybrid.simulation.run_sample import END_FORCES, RunSample, Samples
 
 RAW = {shown: raw for raw, shown in END_FORCES.items()}
-UNITS = {
-    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", **dict.fromkeys(RAW, "N"),
-}  # fmt: skip
+UNITS = {"position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", **dict.fromkeys(RAW, "N")}
 
 # Lowest modes that are looked at, to a line; of several lines at most so many in all.
 MODES, MOST_MODES = 12, 48

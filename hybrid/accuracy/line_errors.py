@@ -410,15 +410,13 @@ class LineErrors:
 
     def checkpoint(self) -> Tree:
         """What it has found until now, as named arrays and plain values."""
-        return {
-            "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
-            "estimate": self.estimate and self.estimate.checkpoint(),
-            "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
-            "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
-            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self.own_notes),
-            "extremes": self.extremes and self.extremes.checkpoint(),
-            "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
-        }  # fmt: skip
+        found: dict[str, Any] = {"coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons]}
+        found |= {"estimate": self.estimate and self.estimate.checkpoint(), "every": self._every}
+        found |= {"statistics": {name: x.checkpoint() for name, x in self.statistics.items()}}
+        found |= {"scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice)}
+        found |= {"irregular": self.irregular, "ratio": self._ratio, "finer": self._judged}
+        found |= {"notes": list(self.own_notes), "extremes": self.extremes and self.extremes.checkpoint()}
+        return found | {"slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL}
 
     def restore(
         self,

@@ -99,17 +99,17 @@ from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import not_converged_attribute
 from hybrid.store.stored_rows import remove_rows
 from hybrid.store.whole_file import LateFile
-from hybrid.store.writer import NOTHING_MORE, Block, Happened, Part, amend, may_be_amended
+from hybrid.store.writer import Block, Happened, Part, amend, may_be_amended
 from hybrid.zones.manager import UserCriterion
 
 if TYPE_CHECKING:
     from hybrid.accuracy.free_vibrations import LostBy
 
-UNITS = {
-    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
-    "right_tension": "N", "right_curvature": "1/m", "right_bending_moment": "N m",
-    "end_force_start": "N", "end_force_end": "N",
-}  # fmt: skip
+    Lost = Callable[[], LostBy]
+
+UNITS = {"position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m"}
+UNITS |= {"right_tension": "N", "right_curvature": "1/m", "right_bending_moment": "N m"}
+UNITS |= {"end_force_start": "N", "end_force_end": "N"}
 CAUSES = {
     "mesh": "error by the mesh",
     "time": "error by the time step",
@@ -122,9 +122,8 @@ Attributes = Mapping[str, str | float | int]
 
 
 def write_errors(
-    target: Path | io.BytesIO | LateFile, case: Case, control: ErrorController, cpu: float,
-    before: Tree | None = NOTHING_MORE,
-) -> None:  # fmt: skip
+    target: Path | io.BytesIO | LateFile, case: Case, control: ErrorController, cpu: float, before: Tree | None
+) -> None:
     """Add errors, attributes and events of all lines to the complete result of a case.
 
     cpu: s, of all passes; before: as of `amend`.
@@ -177,8 +176,8 @@ class Report:
         return Part(group, self.fields, self.blocks, others)
 
 
-def _of_line(case: Case, control: ErrorController, name: str, cpu: float, vibrations: Callable[[], LostBy]) -> Report:
-    """What is added to the result of a line; cpu: s, of all passes; vibrations: finds what steps lose of free ones."""
+def _of_line(case: Case, control: ErrorController, name: str, cpu: float, lost: Lost) -> Report:
+    """What is added to the result of a line; cpu: s, of all passes; lost: finds what steps lose of free vibrations."""
     line, result, scene = control.lines[name], control.standing[name], case.lines[name]
     errors = line.estimate.errors if line.estimate is not None else None
     attributes = effort(scene, line, result, cpu)
@@ -193,7 +192,7 @@ def _of_line(case: Case, control: ErrorController, name: str, cpu: float, vibrat
                 yield full, begin, at_all_points(values, result.places) if along else values
 
     def others(happened: Happened) -> tuple[dict[str, str | float | int], list[tuple[str, str]]]:
-        found, notes = known(scene, line, result, errors, happened, vibrations)
+        found, notes = known(scene, line, result, errors, happened, lost)
         if line.asked is not None:
             of = [x.errors for x in line.statistics.values()] if line.irregular else [errors]
             each = figures(line.asked, [x for x in of if x is not None], result, line.scattered, line.extremes)
@@ -223,12 +222,11 @@ def effort(scene: LineScene, control: LineErrors, result: RunSample, cpu: float)
 
 
 def known(
-    scene: LineScene, control: LineErrors, result: RunSample, errors: Errors | None, happened: Happened,
-    vibrations: Callable[[], LostBy],
-) -> tuple[dict[str, float | str], list[tuple[str, str]]]:  # fmt: skip
+    scene: LineScene, control: LineErrors, result: RunSample, errors: Errors | None, happened: Happened, lost: Lost
+) -> tuple[dict[str, float | str], list[tuple[str, str]]]:
     """The largest errors, as attributes, and events of a result.
 
-    happened: its events until now; vibrations: finds what steps lose of free ones, by quantity.
+    happened: its events until now; lost: finds what steps lose of free vibrations, by quantity.
     """
     undersampled: list[tuple[str, str]] = []
     if errors is not None and control.moves:
@@ -242,7 +240,7 @@ def known(
             bounds = None if control.asked is None else sizes_of(control.asked, result)
             from hybrid.accuracy.free_vibrations import uncertain_by_vibrations
 
-            undersampled += uncertain_by_vibrations(vibrations(), result, largest, bounds)
+            undersampled += uncertain_by_vibrations(lost(), result, largest, bounds)
     found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
     if control.extremes is not None:
         found[EXTREME_ERRORS] = extreme_figures(control.extremes.run.extremes, control.extremes.errors)
@@ -325,7 +323,7 @@ class Passes:
         if remaining is not None and remaining.before:
             control = self._controls(compute)
             with refused(self.source or Path()):
-                control.restore(remaining.before, case.lines, case.points, self.source, resolution)
+                control.restore(remaining.before, self.source, resolution)
             case.places |= {name: x.places for name, x in control.lines.items() if x.places is not None}
             proceed = control.proceed
         else:
@@ -421,14 +419,12 @@ class Passes:
 
     def _errors_of(self, name: str, scene: LineScene) -> LineErrors:
         """What will be known of the errors of a line."""
-        case = self.case
-        times = output_times(scene) if case.moves else []
-        free = free_in(scene)
-        return LineErrors(
-            requested_accuracy(scene), free if case.moves else free._replace(steps=False), case.moves,
-            case.moves and is_irregular(scene), self._choices.get(name, NAMED), case.from_rest,
-            rubs_on_obstacles(scene), np.array([0.0, *times]), may_be_held(scene),
-        )  # fmt: skip
+        case, held = self.case, may_be_held(scene)
+        times, free = output_times(scene) if case.moves else [], free_in(scene)
+        free = free if case.moves else free._replace(steps=False)
+        asked, irregular = requested_accuracy(scene), case.moves and is_irregular(scene)
+        how = self._choices.get(name, NAMED), case.from_rest, rubs_on_obstacles(scene), np.array([0.0, *times]), held
+        return LineErrors(asked, free, case.moves, irregular, *how)
 
     def _surveyed(self, resolution: NetworkResolution) -> NetworkResolution:
         """Models, of lines whose scene names none, and cells by a pre-run, if an accuracy is asked for."""

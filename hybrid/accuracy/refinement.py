@@ -197,9 +197,12 @@ def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> 
 
 
 def figures(
-    asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample, by_chance: Collection[str] = (),
+    asked: RequestedAccuracy,
+    errors: Sequence[Errors],
+    run: RunSample,
+    by_chance: Collection[str] = (),
     extremes: ExtremeErrors | None = None,
-) -> list[dict[str, str | float | None]]:  # fmt: skip
+) -> list[dict[str, str | float | None]]:
     """What is asked of each quantity, and its error, the largest of several; errors: empty where they are not known.
 
     by_chance: end forces whose largest values are, so that their error misses nothing; extremes: as of `judge`.

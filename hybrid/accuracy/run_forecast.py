@@ -194,10 +194,10 @@ def _measured(scene: Scene, found: NetworkPlan) -> NetworkPlan:
     for name, called, (resolution, line) in zip(found.lines, scenes, made, strict=True):
         model, choice = build(line, resolution), choices.get(called, NAMED)
         lines[name] = _of_line(case, called, scenes[called], plans[called], model, choice)
-    return replace(
-        tables.together(lines, found.free), seconds=survey + seconds, most_seconds=survey + most, measured=True,
-        steps=round(steps), step=min(finely.one.step, scene.require_time().duration / steps),
-    )  # fmt: skip
+    together = tables.together(lines, found.free)
+    step = min(finely.one.step, scene.require_time().duration / steps)
+    together = replace(together, steps=round(steps), step=step, measured=True)
+    return replace(together, seconds=survey + seconds, most_seconds=survey + most)
 
 
 def _of_line(case: _Probe, name: str, scene: LineScene, found: Plan, model: Model, choice: ModelChoice) -> Plan:
@@ -208,10 +208,8 @@ def _of_line(case: _Probe, name: str, scene: LineScene, found: Plan, model: Mode
         here, state = case.at_rest[name]
         torque = tables.critical_torque(scene, here, state.T)
     contents = with_accuracy(found.contents, scene, case.reach.get(name))
-    return replace(
-        found, **tables.mesh_of(model), payout=payout, critical_torque=torque, contents=contents,
-        chosen=choice.kind, why=choice.why,
-    )  # fmt: skip
+    mesh = tables.mesh_of(model) | {"payout": payout, "critical_torque": torque}
+    return replace(found, **mesh, contents=contents, chosen=choice.kind, why=choice.why)
 
 
 def _still_to_come(seen: Sequence[Seen], duration: float) -> float:

@@ -146,10 +146,9 @@ class SmallSea:
 
     def __init__(self, sea: Sea, places: int) -> None:
         """places: at which there is water."""
-        self.sea = sea._replace(
-            waves=np.zeros((1, sea.waves.shape[1])), orbits=np.zeros(1), now=np.array([0.0, sea.now[1], 1.0, 0.0]),
-            flow=np.zeros((places, 7)), lanes=np.zeros((12, LANES)),
-        )  # fmt: skip
+        still = sea._replace(waves=np.zeros((1, sea.waves.shape[1])), orbits=np.zeros(1))
+        now = np.array([0.0, sea.now[1], 1.0, 0.0])
+        self.sea = still._replace(now=now, flow=np.zeros((places, 7)), lanes=np.zeros((12, LANES)))
 
     def still(self) -> Sea:
         """Without waves."""
@@ -347,10 +346,9 @@ class LoadedLine:
         for k in (0, 1):
             if not self.line.spin[-k] and self.hinges[k, 0] > 0.0 and len(size) > 2:
                 self._fade_at_hinge(k, q[:, 1:, 0], size, kappa)
-        return LineResponse(
-            self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), omegas / (2.0 * np.pi), q[:, :, 1:4],
-            q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,
-        )  # fmt: skip
+        s, at_rest = self.line.s, (state.r.copy(), state.T.copy(), size)
+        along = s.copy(), 0.5 * (s[1:] + s[:-1]), omegas / (2.0 * np.pi)
+        return LineResponse(*along, q[:, :, 1:4], q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], *at_rest)
 
     def _bend_at_end(self, k: int) -> tuple[float, float]:
         """The bend, rad, of the element at end k at rest, in the axes of the section before it."""

@@ -270,10 +270,8 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
     for k in (0, 1):
         if x.seats[k, TURNS] != 0.0:
             turned[k], moments[k] = by_turn(line, x, ends, state, k)
-    return LinearLine(
-        name, line, state, K, M, sparse_rows(standing), tuple(map(sparse_rows, carried)), free.ravel(), forces, turned,
-        moments, layers,
-    )  # fmt: skip
+    springs = sparse_rows(standing), tuple(map(sparse_rows, carried))
+    return LinearLine(name, line, state, K, M, *springs, free.ravel(), forces, turned, moments, layers)
 
 
 def _at_ends(
@@ -409,9 +407,13 @@ def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tupl
 
 
 def linear_network(
-    solver: NetworkSolver, states: NetworkState, names: Sequence[str], sticks: bool, quick: bool = True,
+    solver: NetworkSolver,
+    states: NetworkState,
+    names: Sequence[str],
+    sticks: bool,
+    quick: bool = True,
     touching: TouchingLines | None = None,
-) -> LinearNetwork:  # fmt: skip
+) -> LinearNetwork:
     """The lines, points and bodies of a solver, linear about an equilibrium.
 
     sticks, quick: as of `linear_line`; touching: lines that touch each other, or themselves, in it.
@@ -441,11 +443,9 @@ def linear_network(
     pull = max(float(np.abs(x.state.T).max()) for x in lines)
     layers = sparse.csr_array(place.T @ sparse.block_diag([x.by_layers for x in lines], format="csr") @ place)
     slow = solver.anchor / STATIC_ANCHOR * max(pull / solver.scale, 1.0)
-    return LinearNetwork(
-        lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T) + layers),
-        sparse.csc_array(0.5 * (M + M.T)), apart, points, bodies, slow,
-        np.asarray(place.T @ _lent(lines, solver)), parts, whole,
-    )  # fmt: skip
+    K, turns, M = (sparse.csc_array(each) for each in (0.5 * (A + A.T), 0.5 * (A - A.T) + layers, 0.5 * (M + M.T)))
+    lent = np.asarray(place.T @ _lent(lines, solver))
+    return LinearNetwork(lines, at, place, K, turns, M, apart, points, bodies, slow, lent, parts, whole)
 
 
 def _joined(

@@ -89,7 +89,10 @@ def along(mean: Floats, deviation: Floats) -> Floats:
     return np.asarray(2.0 * (gauss + mean * erf(ratio / math.sqrt(2.0))))
 
 
-def phases_of(omegas: Floats) -> NDArray[np.complex128] | None:
+Phases = NDArray[np.complex128]
+
+
+def phases_of(omegas: Floats) -> Phases | None:
     """exp(-i phase) (P, F) at which a sum of frequencies (F,), increasing, is seen; None: many, a normal process.
 
     Multiples of the lowest keep to each other: over its period.  Of others, few, all phases are as likely.
@@ -108,7 +111,7 @@ def phases_of(omegas: Floats) -> NDArray[np.complex128] | None:
     return np.concatenate([found, -found])  # as far to one side as to the other
 
 
-def of_few(mean: Floats, amplitudes: Floats, phases: NDArray[np.complex128]) -> Floats:
+def of_few(mean: Floats, amplitudes: Floats, phases: Phases) -> Floats:
     """The law (n, m, m) of few harmonics about mean velocities (n, m), of complex amplitudes (F, n, m); m = 1, 2 or 3.
 
     phases: (P, F).  In directions without motion, E[df/du].
@@ -126,7 +129,7 @@ def of_few(mean: Floats, amplitudes: Floats, phases: NDArray[np.complex128]) -> 
     return np.asarray(B + mean_slope @ (np.eye(m) - covariance @ inverse))
 
 
-def linear_law(mean: Floats, u: Floats, phases: NDArray[np.complex128] | None) -> Floats:
+def linear_law(mean: Floats, u: Floats, phases: Phases | None) -> Floats:
     """The law (n, m, m) by mean velocities (n, m) and amplitudes (F, n, m); m = 2 or 3; phases: of few frequencies."""
     if phases is not None:
         return of_few(mean, u, phases)
@@ -147,9 +150,8 @@ def axes_across(d: Floats) -> Floats:
 
 
 def of_cylinders(
-    d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats,
-    phases: NDArray[np.complex128] | None,
-) -> Floats:  # fmt: skip
+    d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats, phases: Phases | None
+) -> Floats:
     """Linear drag (H, 3, 3) N s/m of cylinders along d (H, 3) in moving water.
 
     axes: (H, 2, 3) across; current: mean relative velocity (H, 3) m/s, u: its amplitudes (F, H, 3); drag: across and

@@ -218,10 +218,12 @@ def _add_bodies(
                 out.add(b, places_of(node - 1 + n), -part * by_nodes[:, n])
 
 
+At = tuple[np.ndarray, int, int, int]
+
+
 def _on_obstacles(
-    solver: NetworkSolver, states: NetworkState, l: int, pressed: Floats, at: tuple[np.ndarray, int, int, int],
-    sticks: bool, sheaves: Sequence[int],
-) -> Iterator[Touch]:  # fmt: skip
+    solver: NetworkSolver, states: NetworkState, l: int, pressed: Floats, at: At, sticks: bool, sheaves: Sequence[int]
+) -> Iterator[Touch]:
     """What line l does on the obstacles that it lies on, of which bodies carry some.
 
     at: where nodes of lines begin, where the unknowns of bodies and sheaves do, and how many there are.
@@ -299,9 +301,14 @@ def hats(a: Floats) -> Floats:
 
 
 def _of_lines(
-    contact: Contact, lines: Sequence[int], node_of: np.ndarray, states: NetworkState, touching: TouchingLines,
-    asked: tuple[bool, int], forces: Floats,
-) -> Iterator[tuple[Touch, Floats]]:  # fmt: skip
+    contact: Contact,
+    lines: Sequence[int],
+    node_of: np.ndarray,
+    states: NetworkState,
+    touching: TouchingLines,
+    asked: tuple[bool, int],
+    forces: Floats,
+) -> Iterator[tuple[Touch, Floats]]:
     """Each pair of lines that touch, and the springs (n,) N/m of its friction; their forces are added to `forces`.
 
     asked: whether friction sticks, how many unknowns there are.
@@ -395,10 +402,9 @@ def rest_of(network: Any, resolution: NetworkResolution) -> Rest:
         row[MASS : MASS + 36] = body.numbers[MASS : MASS + 36]
     solver, model = NetworkSolver(lines, len(found.net), found.bodies), run.model
     touching = TouchingLines(found, friction_between(model)) if run.found.settled else None
-    return Rest(
-        solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies, touching,
-        model.touching, {end: form.text(f"point {point}") for end, point in _tips(network, model).items()},
-    )  # fmt: skip
+    tips = {end: form.text(f"point {point}") for end, point in _tips(network, model).items()}
+    lines_and_points = tuple(model.names), model.models, tuple(model.free)
+    return Rest(solver, run.state, *lines_and_points, bodies, model.bodies, touching, model.touching, tips)
 
 
 def _tips(network: Network, model: NetworkModel) -> dict[tuple[str, int], str]:

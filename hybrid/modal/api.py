@@ -157,10 +157,9 @@ def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction
     lines = fine.network.lines
     shift = fine.network.unit_shifts()
     whole = np.einsum("ij,ij->j", shift, fine.network.mass @ shift)
-    return Modes(
-        asked.title, tuple(found), {x.name: x.line.s.copy() for x in lines}, {x.name: x.r.copy() for x in lines},
-        whole, sum(x.line.h.size for x in lines), tuple(notes),
-    )  # fmt: skip
+    along, places = {x.name: x.line.s.copy() for x in lines}, {x.name: x.r.copy() for x in lines}
+    cells = sum(x.line.h.size for x in lines)
+    return Modes(asked.title, tuple(found), along, places, whole, cells, tuple(notes))
 
 
 def _check(count: int, near: float | None) -> None:
@@ -231,12 +230,11 @@ class _Shape:
         energy = self.energy
         network = self.found.network
         factor = network.unit_shifts().T @ (network.mass @ self.vector)
-        return Mode(
-            period, None if error is None else error * period, self.what, energy, factor**2,
-            {k: x / largest for k, x in shifts.items()}, {k: x / largest for k, x in twists.items()},
-            {k: x / largest for k, x in self.points.items()}, {k: x / largest for k, x in self.bodies.items()},
-            {k: x / largest for k, x in self.sheaves.items()},
-        )  # fmt: skip
+        off = None if error is None else error * period
+        parts = ({k: x / largest for k, x in each.items()} for each in (shifts, twists, self.points, self.bodies))
+        shifts, twists, points, bodies = parts
+        sheaves = {k: x / largest for k, x in self.sheaves.items()}
+        return Mode(period, off, self.what, energy, factor**2, shifts, twists, points, bodies, sheaves)
 
     def _sign(self, shifts: Mapping[str, Floats]) -> float:
         """So that the largest component of the largest shift is positive, and mirrored scenes have mirrored shapes."""

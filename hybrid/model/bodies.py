@@ -80,10 +80,8 @@ class Members:
         self._sea.values = self._sea.values._replace(now=self._sea.values.now.copy())
         self._job, self._state, self._asked = Table(blank_members_job), np.zeros(STATE), np.zeros((2, 1))
         places, still = np.zeros((2, len(pieces), 3))
-        self._job.bind(
-            sea=self._sea.values, pieces=pieces, sizes=sizes, places=places, still=still, state=self._state,
-            dt=self._asked[0], waves=self._asked[1],
-        )  # fmt: skip
+        self._job.bind(sea=self._sea.values, pieces=pieces, sizes=sizes, places=places, still=still, state=self._state)
+        self._job.bind(dt=self._asked[0], waves=self._asked[1])
 
     @property
     def sea(self) -> Sea:
@@ -143,7 +141,7 @@ def angles_of(frame: Floats) -> Floats:
 
 def loads_of(given: tuple[GivenLoad, ...]) -> tuple[EndLoad, ...]:
     """Forces and moments that a scene gives."""
-    return tuple(end_load(x.what, 0, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in given)
+    return tuple(end_load(x, 0) for x in given)
 
 
 @dataclass(frozen=True)

@@ -277,10 +277,17 @@ def zone_plans(scene: LineScene) -> tuple[ZonePlan, ...]:
     return (ZonePlan("rod" if isinstance(model, AdaptiveModel | RodModel) else "catenary", scene.length),)
 
 
+Plans = tuple[ZonePlan, ...]
+Placed = tuple[Floats, tuple[Zone, ...]]  # nodes (N+1,) m, and zones
+
+
 def build(
-    scene: LineScene, resolution: Resolution | None = None,
-    mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None, like: Model | None = None, spare: bool = True,
-) -> Model:  # fmt: skip
+    scene: LineScene,
+    resolution: Resolution | None = None,
+    mesh: Layout | Placed | None = None,
+    like: Model | None = None,
+    spare: bool = True,
+) -> Model:
     """Make the model that a scene requires; resolution: how finely, None: as it asks for.
 
     mesh: nodes (N+1,) m and zones, or the layout of a line whose zones move, all rod; None: as resolution places them.
@@ -330,16 +337,27 @@ def build(
     elif plane is not None and scene.dimension == 2:
         line = planar(line, plane)
     return Model(
-        line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        contents=contents_of(scene, line, zones, flat), length=float(s[-1]), tension_scale=scale,
+        line=line,
+        zones=zones,
+        ends=ends,
+        sea=sea,
+        start=start,
+        start_shape=shape_name,
+        other_starts=tuple(others),
+        contents=contents_of(scene, line, zones, flat),
+        length=float(s[-1]),
+        tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not line.ck.any(),
-        attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
+        attached=tuple(cable.at.tolist()),
+        cable=cable,
+        layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
-        plane=plane, kept_in=kept,
+        plane=plane,
+        kept_in=kept,
         payout=paid or payout_plan(scene, line, zones, to_compare=to_compare),
-    )  # fmt: skip
+    )
 
 
 def place_cells(
@@ -453,9 +471,8 @@ def _resists_spin(scene: LineScene, cable: Material) -> bool:
 
 
 def _placed(
-    scene: LineScene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
-    usual: int,
-) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
+    scene: LineScene, cable: Material, plans: Plans, cuts: Sequence[float], resolution: Resolution, usual: int
+) -> Placed:
     """Nodes and zones; usual: cells of a line whose scene does not say."""
     if (placed := _at_places(scene, plans, cuts, resolution)) is not None:
         return placed
@@ -481,9 +498,8 @@ def _dense_in_stiffeners(scene: LineScene, s: Floats, fineness: float) -> Floats
 
 
 def _placed_by_mesh(
-    scene: LineScene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
-    usual: int,
-) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
+    scene: LineScene, cable: Material, plans: Plans, cuts: Sequence[float], resolution: Resolution, usual: int
+) -> Placed:
     """The same, where stiffeners are no more than changes of section."""
     mesh, free = scene.mesh, mesh_is_free(scene)
     carries = all(plan.kind == "rod" for plan in plans)

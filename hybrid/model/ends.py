@@ -20,6 +20,7 @@ from hybrid.kernels.state.state import (
     no_moves,
 )
 from hybrid.scene.motion import MotionTerms
+from hybrid.scene.motion_tables import GivenLoad
 
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
 SAME_DIRECTION = 1e-6
@@ -96,13 +97,12 @@ class EndLoad(NamedTuple):
         return np.array([np.interp(t, self.history[:, 0], column) for column in self.history[:, 1:].T])
 
 
-def end_load(
-    what: Literal["force", "moment"], end: int, values: Sequence[Sequence[float]], until: float, ramp: float | None,
-    rows: Sequence[Sequence[float]],
-) -> EndLoad:  # fmt: skip
-    """A load with all values (n, 3) that it takes, and the rows (R, 4) of its history, if it has one."""
-    largest = max(values, key=lambda v: float(np.dot(v, v)))
-    return EndLoad(what, end, np.array(largest, float), until, ramp, np.array(rows, float).reshape(-1, 4))
+def end_load(given: GivenLoad, end: int) -> EndLoad:
+    """The load that a scene gives an end: its largest value, and the rows (R, 4) of its history, if it has one."""
+    largest = max(given.values, key=lambda v: float(np.dot(v, v)))
+    until = np.inf if given.until is None else given.until
+    rows = np.array(given.rows, float).reshape(-1, 4)
+    return EndLoad(given.what, end, np.array(largest, float), until, given.ramp, rows)
 
 
 def table_of_loads(loads: Sequence[EndLoad]) -> tuple[Floats, Floats]:
@@ -146,10 +146,9 @@ def table_of_motions(
         moves.file[k] = first, first + max(terms.knots.size - 1, 0)
         knots.append(terms.knots)
         cubics.append(terms.cubics)
-    return moves._replace(
-        position=position, frame=frame, harmonics=np.array(harmonics).reshape(-1, 5), knots=np.concatenate(knots),
-        cubics=np.concatenate(cubics), paths=paths,
-    )  # fmt: skip
+    waves = np.array(harmonics).reshape(-1, 5)
+    moves = moves._replace(harmonics=waves, knots=np.concatenate(knots), cubics=np.concatenate(cubics))
+    return moves._replace(position=position, frame=frame, paths=paths)
 
 
 class EndConditions:

@@ -411,9 +411,7 @@ def end_conditions(
         base = np.column_stack([directors[k], np.cross(t, directors[k]), t])
         frame[k] = base.ravel()
         position[k] = end.held_position or (0.0, 0.0, 0.0)
-        loads += [
-            end_load(x.what, k, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in end.loads
-        ]
+        loads += [end_load(x, k) for x in end.loads]
         motion = end.prescribed_motion
         if motion is not None:
             waves = around.waves_of_vessels, float(around.values.ramps[1]), end.held_tangent is not None

@@ -74,22 +74,26 @@ def line_on(
         bits |= BENDING_LAW
     if material.layered:
         bits |= BENDING_SLIP
-    return on_base(material, cable_on(material, s, bits, inertia), s, np.arange(rod.size), rod, bits)
+    cable, cells = cable_on(material, s, bits, inertia), (np.arange(rod.size), rod)
+    return on_base(material, cable, s, cells, bits, Table(blank_line_job))
+
+
+Cells = tuple[NDArray[np.int64], np.ndarray]
 
 
 def on_base(
-    material: Material, cable: Cable, s: Floats, of_cell: NDArray[np.int64], rod: np.ndarray, bits: int,
-    plane: Floats = NO_PLANE, job: Table | None = None,
-) -> Line:  # fmt: skip
-    """The line of a material with nodes s (N+1,) m; of_cell, rod: (N,) base cells of its cells, whether they are rod.
+    material: Material, cable: Cable, s: Floats, cells: Cells, bits: int, job: Table, plane: Floats = NO_PLANE
+) -> Line:
+    """The line of a material with nodes s (N+1,) m on base cells.
 
-    cable: that on the base cells; job: a table of kernels.mesh.remesh.LineJob, None: a new one.
+    cable: that on these; cells: (N,) base cells of its cells, and whether they are rod; job: a table of
+    kernels.mesh.remesh.LineJob.
     """
+    of_cell, rod = cells
     h, of = np.diff(s), material.piece(0.5 * (s[:-1] + s[1:]))
     torque, twist = material.torque_by_tension(h, of)
     torsion = torsion_zones(material, h, rod, of)
     line: Line = lines(h.size, bits=bits, plane=plane, torsion=torsion, tension_torque=torque, tension_twist=twist)
-    job = job or Table(blank_line_job)
     job.bind(cable=cable, nodes=s, base_of_cell=of_cell, rod=rod, line=line)
     fill_line(job.numbers)
     if material.curves is not None:
@@ -123,12 +127,9 @@ def cable_on(material: Material, base: Floats, bits: int, inertia: int) -> Cable
     load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
     load[place], turns[nodes_at(material.swivels, base)] = 1, 1
     points = np.zeros((len(OF_POINTS), base.size))
-    cable = Cable(
-        made=made_of(material, inertia)[of], EI=material.mean_bending[of], w=np.abs(material.submerged_weight[of]),
-        points=points, blank=np.zeros(len(points)), load=load, turns=turns,
-        held=np.array([material.held_tangent, material.held_twist], np.int8).T.copy(),
-        springs=np.array(material.springs),
-    )  # fmt: skip
+    held = np.array([material.held_tangent, material.held_twist], np.int8).T.copy()
+    made, EI, w = made_of(material, inertia)[of], material.mean_bending[of], np.abs(material.submerged_weight[of])
+    cable = Cable(made, EI, w, points, np.zeros(len(points)), load, turns, held, np.array(material.springs))
     put_points(material, place, cable, bits)
     return cable
 

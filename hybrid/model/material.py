@@ -360,9 +360,11 @@ def _bare(scene: LineScene, bounds: Floats, of: list[Section]) -> Material:
     """The cable without its water and its attachments."""
     k, gravity = len(of), scene.environment.gravity
     unasked: dict[str, Any] = {name: np.full(k, np.nan) for name in PER_LENGTH if name not in OF_SECTIONS}
+    unasked |= {name: np.zeros(0) for name in ("at", "lift", "footing")} | {"bits": 0}
     start, end = scene.ends.both
     out = Material(
-        bounds=bounds, edges=bounds[1:-1],
+        bounds=bounds,
+        edges=bounds[1:-1],
         mass=np.array([x.mass for x in of], float),
         weight=np.array([x.mass * gravity for x in of], float),
         ck=np.array([mean_compliance(x) for x in of]),
@@ -371,15 +373,15 @@ def _bare(scene: LineScene, bounds: Floats, of: list[Section]) -> Material:
         kappa=np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float),
         rotary=np.array([rotary_inertia(x)[0] for x in of]),
         polar=np.array([rotary_inertia(x)[1] for x in of]),
-        **unasked, bits=0,
+        **unasked,
         swivels=np.array(swivels(scene), float),
         outer_diameter=np.array([x.diameter or 0.0 for x in of]),
         held_tangent=(start.held_tangent is not None, end.held_tangent is not None),
         held_twist=(start.holds_twist, end.holds_twist),
         springs=(start.spring, end.spring),
         hinged=(not start.acts_by_moment, not end.acts_by_moment),
-        at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
-    )  # fmt: skip
+        points={name: np.zeros(0) for name in POINT},
+    )
     out.sections_turn, out.rubs = any(x.turns for x in of), scene.contact.rubs
     if any(x.curve for x in of):
         out.curves = [stretch_law(x) for x in of]

@@ -379,16 +379,14 @@ class LineOnBase:
             put_points(self._material, self._place, self._cable, bits)
             self._bits = bits
         cells = layout.base_of_cell, layout.rod_cells
-        line = on_base(self._material, self._cable, layout.nodes, *cells, bits, plane, self._line_job)
+        line = on_base(self._material, self._cable, layout.nodes, cells, bits, self._line_job, plane)
         return line._replace(moved=moved)
 
     def kinds(self, layout: Layout, free: np.ndarray, scale: float) -> NodeKinds:
         """What criteria know of the nodes of a layout; free: (n,) of base cells; scale: tension scale, N."""
         kinds: NodeKinds = kinds_of(layout.base_of_cell.size, free=free)
-        self._kinds_job.bind(
-            cable=self._cable, base_of_cell=layout.base_of_cell, kinds=kinds, floor_part=TENSION_FLOOR,
-            least=LEAST_TENSION * scale,
-        )  # fmt: skip
+        self._kinds_job.bind(cable=self._cable, base_of_cell=layout.base_of_cell, kinds=kinds)
+        self._kinds_job.bind(floor_part=TENSION_FLOOR, least=LEAST_TENSION * scale)
         fill_kinds(self._kinds_job.numbers)
         kinds.node[[0, -1]] = np.where(self._material.hinges[:2, 0] > 0.0, HINGE, kinds.node[[0, -1]])
         return kinds

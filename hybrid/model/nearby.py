@@ -85,10 +85,9 @@ def nearby(
         else:
             axes = _held_axes(model, of, scene, line, cable)
             ends = end_conditions(scene, (axes[0], axes[1]), chords, sea)
-    return replace(
-        model, line=line, zones=zones, ends=ends, sea=sea, length=float(line.s[-1]), cable=cable, layout=layout,
-        on_base=on_base, attached=tuple(cable.at.tolist()), inextensible=not line.ck.any(),
-    )  # fmt: skip
+    cells: dict[str, Any] = {"line": line, "zones": zones, "cable": cable, "layout": layout, "on_base": on_base}
+    cells |= {"attached": tuple(cable.at.tolist()), "inextensible": not line.ck.any()}
+    return replace(model, ends=ends, sea=sea, length=float(line.s[-1]), **cells)
 
 
 def _held_axes(model: Model, of: LineScene, scene: LineScene, line: Line, cable: Material) -> Floats:
@@ -420,10 +419,9 @@ def after_failure(model: NetworkModel, weakness: Weakness, t: float) -> NetworkM
             models[line] = unclamped(models[line], k)
         seats[line, k] = 0.0
     shape = model.models[ends[0][0]].start.r[-ends[0][1]]
-    return replace(
-        model, free=(*model.free, weakness.name), joints=tuple((a, b) for a, b in joints),
-        places=np.vstack([model.places, shape]), loose=loose, models=tuple(models), seats=seats,
-    )  # fmt: skip
+    places, free = np.vstack([model.places, shape]), (*model.free, weakness.name)
+    model = replace(model, joints=tuple((a, b) for a, b in joints), models=tuple(models), seats=seats)
+    return replace(model, free=free, places=places, loose=loose)
 
 
 def _with_free_end(model: NetworkModel, line: int, k: int, t: float) -> NetworkModel:

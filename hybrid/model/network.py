@@ -220,7 +220,7 @@ def build_network(
     resolution = resolution or NetworkResolution.first(network)
     joined = _joined(network, places, bodies)
     joint, fairleads = joined.joint, joined.fairleads
-    maker = FirstLines(network, joined, bodies, resolution)
+    maker = FirstLines(network, joined, bodies, resolution, None)
     if like is not None:
         maker.meshes = {name: model.mesh for name, model in zip(like.names, like.models, strict=True)}
     maker.turn_points()
@@ -252,12 +252,11 @@ def build_network(
             known[name] = KnownMotion(body, models[0].sea)
     connections = [x.connections for x in network.lines.values()]
     turns = ((getattr(x.start, "turns", 0.0), getattr(x.end, "turns", 0.0)) for x in connections)
-    return NetworkModel(
-        tuple(network.lines), tuple(models), free, network.rigid, joints, places, made, maker.bodies,
-        np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
-        maker.seats, known, scenes, resolution, tuple(loads_of(network.moments_on(x)) for x in network.rigid),
-        tuple(turns), touching, may_meet, rides=rides,
-    )  # fmt: skip
+    on_bodies = np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends])
+    loads = tuple(loads_of(network.moments_on(x)) for x in network.rigid)
+    lines = tuple(network.lines), tuple(models), free, network.rigid, joints, places, made, maker.bodies, on_bodies
+    more = maker.seats, known, scenes, resolution, loads, tuple(turns), touching, may_meet
+    return NetworkModel(*lines, *more, rides=rides)
 
 
 def with_surfaces(network: Network, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
@@ -323,7 +322,7 @@ def first_places(network: Network, made: Sequence[BodyModel]) -> tuple[tuple[str
 def first_lines(network: Network, made: Sequence[BodyModel], resolution: NetworkResolution) -> FirstLines:
     """What makes lines between first places of points and bodies, with free points that are not turned yet."""
     _, places, bodies = first_places(network, made)
-    return FirstLines(network, _joined(network, places, bodies), bodies, resolution)
+    return FirstLines(network, _joined(network, places, bodies), bodies, resolution, None)
 
 
 def bodies_of(network: Network) -> tuple[BodyModel, ...]:
@@ -444,7 +443,7 @@ def starts_between(network: Network, places: Floats, bodies: Floats, model: Netw
     places: (P, 3) m of the free points; bodies: (B, STATE), which are returned too, with the axes of points that lines
     are clamped to.
     """
-    maker = FirstLines(network, _joined(network, places, bodies), bodies, model.resolution, model)
+    maker = FirstLines(network, _joined(network, places, bodies), bodies, model.resolution, model.seats)
     maker.turn_points()
     return [maker.start(name, each) for name, each in zip(model.names, model.models, strict=True)], maker.bodies
 
@@ -453,11 +452,9 @@ class FirstLines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
-        self, network: Network, joined: _Joined, bodies: Floats, resolution: NetworkResolution,
-        before: NetworkModel | None = None,
-    ) -> None:  # fmt: skip
-        """before: a model that was made before, whose seats hold; None: as the first shapes lie."""
-        seats = None if before is None else before.seats
+        self, network: Network, joined: _Joined, bodies: Floats, resolution: NetworkResolution, seats: Floats | None
+    ) -> None:
+        """seats: of a model that was made before; None: as the first shapes lie."""
         self._network, self._at, self.bodies, self._rows = network, joined.at, bodies.copy(), joined.rows
         self._given, self._names, self._resolution = seats, list(network.lines), resolution.lines
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats

@@ -245,10 +245,12 @@ class PayoutPlan:
         return out
 
 
+Parts = Callable[[Material, Floats], np.ndarray]
+
+
 def payout_plan(
-    scene: LineScene, line: Line, zones: tuple[Zone, ...],
-    parts: Callable[[Material, Floats], np.ndarray] | None = None, to_compare: bool = False,
-) -> PayoutPlan | None:  # fmt: skip
+    scene: LineScene, line: Line, zones: tuple[Zone, ...], parts: Parts | None = None, to_compare: bool = False
+) -> PayoutPlan | None:
     """What a scene's line consists of that is paid out; None: its length stays.  SceneError: it cannot be done.
 
     line: of base cells, where cells follow the curvature; parts: (n,) finest cells of those between nodes (n+1,) m;
@@ -299,10 +301,9 @@ def payout_plan(
     finest = np.ones(places.size - 1, int)
     if parts is not None:
         finest = parts(cable, places) if side else parts(cable, far - places[::-1])[::-1]
-    return PayoutPlan(
-        side, far, law, places, finest, length, longest, shortest, zones, cable, _pieces(scene, cable, side, far),
-        payout.from_outside, winch, layer, line.s.copy(),
-    )  # fmt: skip
+    pieces, lengths = _pieces(scene, cable, side, far), (length, longest, shortest)
+    from_outside, s = payout.from_outside, line.s.copy()
+    return PayoutPlan(side, far, law, places, finest, *lengths, zones, cable, pieces, from_outside, winch, layer, s)
 
 
 def _last_fixed(scene: LineScene, zones: Sequence[Zone], side: int) -> float:

@@ -252,10 +252,8 @@ def _in_words(cost: Cost) -> str:
 # s per cell and Newton iteration, in space and in a plane.
 COST = {"rod": (0.4e-6, 0.16e-6), "catenary": (0.095e-6, 0.09e-6)}
 # What optional forces add to that; those that are not here add nothing measurable.
-MORE = {
-    DRAG: (0.03e-6, 0.025e-6), ADDED_MASS: (0.03e-6, 0.025e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
-    SURFACE: (0.035e-6, 0.015e-6), SEABED: (0.024e-6, 0.018e-6), FRICTION: (0.01e-6, 0.005e-6),
-}  # fmt: skip
+MORE = {DRAG: (0.03e-6, 0.025e-6), ADDED_MASS: (0.03e-6, 0.025e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0)}
+MORE |= {SURFACE: (0.035e-6, 0.015e-6), SEABED: (0.024e-6, 0.018e-6), FRICTION: (0.01e-6, 0.005e-6)}
 MORE_OF_RODS = {ROTARY: (0.025e-6, 0.005e-6)}
 # s per node, step and wave: sines and exponentials; of nodes that are not below all motion of the water.
 COST_WAVE = 10e-9
@@ -480,10 +478,8 @@ class NetworkPlan:
         """What a user asks for: of a line without a name that of the line, with what all lines come to."""
         if "" not in self.lines:
             return self
-        return replace(
-            self.lines[""], steps=self.steps, step=self.step, seconds=self.seconds, most_seconds=self.most_seconds,
-            measured=self.measured,
-        )  # fmt: skip
+        of_all = ("steps", "step", "seconds", "most_seconds", "measured")
+        return replace(self.lines[""], **{name: getattr(self, name) for name in of_all})
 
 
 def plan(scene: SceneLike) -> Any:
@@ -511,10 +507,9 @@ def together(plans: dict[str, Plan], free: tuple[str, ...]) -> NetworkPlan:
     """Plans of lines by name, and what they come to; free: names of the points that are free."""
     every = list(plans.values())
     shortest = min(every, key=lambda x: x.step)  # all have the steps in common
-    return NetworkPlan(
-        plans, free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps, shortest.step,
-        sum(x.seconds for x in every),
-    )  # fmt: skip
+    cells, unknowns = sum(sum(x.cells) for x in every), sum(x.unknowns for x in every)
+    seconds = sum(x.seconds for x in every)
+    return NetworkPlan(plans, free, cells, unknowns, shortest.steps, shortest.step, seconds)
 
 
 def _plan_of_line(scene: LineScene) -> Plan:
@@ -547,10 +542,8 @@ def _plan(scene: LineScene) -> Plan:
         mean = cells
     seconds = processor_time(scene, model, mean, steps, outputs)
     runs, most_runs = predicted_runs(scene) if scene.time else (1, 1)
-    return Plan(
-        model.contents, **mesh, steps=steps, step=step, seconds=seconds, runs=runs, most_runs=most_runs,
-        critical_torque=_of_hanging(scene, model), payout=paid,
-    )  # fmt: skip
+    mesh |= {"runs": runs, "most_runs": most_runs, "critical_torque": _of_hanging(scene, model)}
+    return Plan(model.contents, **mesh, steps=steps, step=step, seconds=seconds, payout=paid)
 
 
 def mesh_of(model: Model) -> dict[str, Any]:

@@ -303,12 +303,12 @@ def requested_accuracy(scene: LineScene) -> RequestedAccuracy | None:
         line_tension = every
     along = why != "" or any(x is not None for x in named)
     parts = [x for x in (every, of_end_force, *named) if x is not None]
-    return RequestedAccuracy(
-        position, tension, of_end_force, curvature, moment, line_tension, accuracy.instant is not None,
-        tension_scale(scene, scene.cable.sections, True), scene.length, every, of_motion, least, along, why,
-        _limits(scene, min(parts, default=ONE)), max(x.stiffness or 0.0 for x in scene.cable.sections),
-        sum(x.mass * x.length for x in scene.cable.sections),
-    )  # fmt: skip
+    sizes = accuracy.instant is not None, tension_scale(scene, scene.cable.sections, True), scene.length
+    asked = RequestedAccuracy(position, tension, of_end_force, curvature, moment, line_tension, *sizes)
+    asked = replace(asked, every=every, of_motion=of_motion, least=least, along=along, why=why)
+    stiffness = max(x.stiffness or 0.0 for x in scene.cable.sections)
+    mass = sum(x.mass * x.length for x in scene.cable.sections)
+    return replace(asked, limits=_limits(scene, min(parts, default=ONE)), stiffness=stiffness, mass=mass)
 
 
 def _part(text: str | None) -> float | None:

@@ -127,10 +127,8 @@ def surroundings(scene: LineScene, cells: int) -> Surroundings:
             sea = sea._replace(bed_x=grid.x, bed_y=grid.y, bed_heights=heights)
         slope = bed.slope or (0.0, 0.0)
         normal = np.array([0.0 - slope[0], 0.0 - slope[1], 1.0]) / math.hypot(*slope, 1.0)
-        sea = sea._replace(
-            normal=normal, offset=float(normal[2] * bed.z), stiffness=bed.spring, damping=bed.damping,
-            onset=ONSET * pressing(scene) / bed.spring, soil=soil_numbers(bed),
-        )  # fmt: skip
+        sea = sea._replace(normal=normal, offset=float(normal[2] * bed.z), stiffness=bed.spring, damping=bed.damping)
+        sea = sea._replace(onset=ONSET * pressing(scene) / bed.spring, soil=soil_numbers(bed))
         if rubs(bed):
             friction = np.array([bed.friction.axial, bed.friction.lateral]) if bed.friction else np.zeros(2)
             sea = sea._replace(friction=friction, slip_length=slip_length(scene, bed))
@@ -262,10 +260,8 @@ def _harmonics(waves: StreamFunctionWaves, depth: float, gravity: float) -> Floa
     steady = waves.steady(depth, gravity)
     j = np.arange(1, waves.order + 1)
     k, towards = j * steady.k, math.radians(waves.direction)
-    return np.column_stack([
-        steady.elevation, j * (2 * np.pi / waves.period), k * math.cos(towards), k * math.sin(towards),
-        j * math.radians(waves.phase), k,
-    ])  # fmt: skip
+    omega, phase = j * (2 * np.pi / waves.period), j * math.radians(waves.phase)
+    return np.column_stack([steady.elevation, omega, k * math.cos(towards), k * math.sin(towards), phase, k])
 
 
 # Irregular seas as sums of linear waves: spectra, their parts of equal energy, directions that spread.

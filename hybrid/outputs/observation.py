@@ -258,11 +258,9 @@ class Observation(ObservedStates):
             torsion = torsion + np.array([torsion_energy(self.line, turn, T) for turn, T in each])
         if self.line.law.size:
             stretch = self.batch.report[:, STRETCH_ENERGY]
-        return {
-            "kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential,
-            "contact": self.batch.report[:, SEABED_ENERGY],
-            "self_contact": self.batch.report[:, SELF_CONTACT_ENERGY],
-        }  # fmt: skip
+        found = {"kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential}
+        report = self.batch.report
+        return found | {"contact": report[:, SEABED_ENERGY], "self_contact": report[:, SELF_CONTACT_ENERGY]}
 
 
 @dataclass(frozen=True)

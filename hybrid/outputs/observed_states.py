@@ -100,10 +100,16 @@ class Grid:
     """
 
     def __init__(
-        self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
-        changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
+        self,
+        nodes_s: Floats,
+        zones: Sequence[Zone],
+        s: Floats,
+        loads: Sequence[float] = (),
+        changes: Sequence[float] = (),
+        after: bool = False,
+        kept: Sequence[float] = (),
         hinges: Floats = NO_HINGES,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Points s (ns,) m on a mesh with nodes nodes_s (N+1,) m.
 
         loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
@@ -233,16 +239,12 @@ class Grid:
 class VaryingGrid(Grid):
     """A `Grid` for each of nb outputs, on the same stretches: its matrices multiply the values of each by its own."""
 
-    def __init__(
-        self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
-        changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
-        hinges: Floats = NO_HINGES,
-    ) -> None:  # fmt: skip
+    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, *rest: Any, **named: Any) -> None:
         """Points s (nb, ns) m on nodes nodes_s (nb, N+1) m of every output.
 
         zones: of the first output; the rest as of `Grid`.
         """
-        super().__init__(nodes_s[0], zones, s[0], loads, changes, after, kept, hinges)
+        super().__init__(nodes_s[0], zones, s[0], *rest, **named)
         self._grids = [self.moved(x, at) for x, at in zip(nodes_s, s, strict=True)]
 
     def _stacked(self, size: int, of: Callable[[Grid], Rows]) -> Rows:

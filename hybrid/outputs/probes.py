@@ -406,13 +406,11 @@ def works_of(line: Line) -> list[str]:
     return [name for name in WORK if not absent.get(name)]
 
 
-# Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them.
-SIDED = (
-    "tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear", "wall_tension", "von_mises",
-    "capacity_used", "code_used",
-)  # fmt: skip
-# Those of them of which errors are known on both sides: of the right one under right_<name>.
+# Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them; of
+# the first ones errors are known on both sides: of the right one under right_<name>.
 SIDED_ERRORS = ("tension", "curvature", "bending_moment")
+SIDED = {*SIDED_ERRORS, "theta", "phi", "twist", "torque", "shear", "wall_tension", "von_mises"}
+SIDED |= {"capacity_used", "code_used"}
 
 
 def elevation_field(places: Floats) -> Field:

@@ -251,9 +251,14 @@ class StepQuantities:
     """Ranges of the quantities of one line."""
 
     def __init__(
-        self, scene: LineScene, wanted: Mapping[str, Quantity], pipes: Pipes | None = None, line: str = "",
-        shown: Mapping[str, Quantity] = NONE, rows_of: Mapping[str, tuple[int, int]] = NO_ROWS,
-    ) -> None:  # fmt: skip
+        self,
+        scene: LineScene,
+        wanted: Mapping[str, Quantity],
+        pipes: Pipes | None = None,
+        line: str = "",
+        shown: Mapping[str, Quantity] = NONE,
+        rows_of: Mapping[str, tuple[int, int]] = NO_ROWS,
+    ) -> None:
         """wanted: by name; pipes: of which wall tension and stress are kept at every node, in the extremes of the line.
 
         line: its name, of several; shown: clearances by name of two lines that stand with the other one of them, and

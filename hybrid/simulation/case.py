@@ -289,9 +289,8 @@ class Case:
         return samples
 
     def _sample_of(
-        self, line: LineResult, run: Run, data_of: Callable[[str], Any], result: Result, cpu: float,
-        stay: Path | None,
-    ) -> RunSample:  # fmt: skip
+        self, line: LineResult, run: Run, data_of: Callable[[str], Any], result: Result, cpu: float, stay: Path | None
+    ) -> RunSample:
         """What is compared of a line in a complete result.
 
         data_of: arrays of a line by its name in the scene, and of the whole by none; result: that of the line; stay: a
@@ -324,13 +323,12 @@ class Case:
             forces = np.column_stack([own[f"steps/{x}"][()] for x in FORCES])
         if resolution.local is not None:
             notes = damped_vibrations(result)
-        return RunSample(
-            resolution, found, cells, max(run.steps, 1), cpu, 1, b"unresolved bend" in kinds, notes=notes,
-            forces=forces, catenary=np.array([catenary_share(x) for x in result.zones]) if moves else np.zeros(0),
-            touches=b"line touches itself" in kinds, places=places,
-            at_edges=missed, extremes=extremes_about(held, self.points[name].s),
-            rods=rods_of(result.zones),
-        )  # fmt: skip
+        sharp, touches = b"unresolved bend" in kinds, b"line touches itself" in kinds
+        more: dict[str, Any] = {"notes": notes, "forces": forces, "touches": touches, "places": places}
+        more |= {"catenary": np.array([catenary_share(x) for x in result.zones]) if moves else np.zeros(0)}
+        more |= {"at_edges": missed, "extremes": extremes_about(held, self.points[name].s)}
+        steps, rods = max(run.steps, 1), rods_of(result.zones)
+        return RunSample(resolution, found, cells, steps, cpu, 1, sharp, rods=rods, **more)
 
     def _judges(self, name: str) -> bool:
         """Whether limits are held against extremes of a line, or ranges of it are asked for by name."""
@@ -407,16 +405,14 @@ class Case:
         held: dict[str, Any] = {}
         if judged and self._judges(name):
             held = {x.name: y for x, y in line.envelope.fixed()}
-            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t) | run.file.quantities.ranges_of(
-                name
-            )
-        return RunSample(
-            resolution, values, compared_cells(line.model, resolution.fineness if follows else 0.0), run.steps, cpu,
-            resolution.every, rows=rows, forces=found.steps,
-            catenary=found.catenary if moves else np.zeros(0),
-            touches=line.lets_touch or bool(self.scene.lines[name].contact.self), places=self.places[name],
-            extremes=extremes_about(held, self.points[name].s), rods=tuple(sorted(found.rods)),
-        )  # fmt: skip
+            held |= line.envelope.values(line.model.nodes, line.books.extremes, run.t)
+            held |= run.file.quantities.ranges_of(name)
+        cells = compared_cells(line.model, resolution.fineness if follows else 0.0)
+        more: dict[str, Any] = {"rows": rows, "forces": found.steps, "rods": tuple(sorted(found.rods))}
+        more |= {"touches": line.lets_touch or bool(self.scene.lines[name].contact.self), "places": self.places[name]}
+        more |= {"catenary": found.catenary if moves else np.zeros(0)}
+        extremes = extremes_about(held, self.points[name].s)
+        return RunSample(resolution, values, cells, run.steps, cpu, resolution.every, extremes=extremes, **more)
 
     # --- how finely -----------------------------------------------------------------------------
 
@@ -553,12 +549,11 @@ def _sample(line: LineResult, run: Run, cpu: float) -> RunSample:
     at_edges = {name: error[:, 0] for name, error in missed.items()}
     for name, error in layer_errors(seen, [int(np.argmin(np.abs(model.line.s - at))) for at in model.attached]).items():
         at_edges[name] = np.maximum(error, at_edges.get(name, 0.0))
-    return RunSample(
-        run.resolution.lines[line.name], {name: np.array(values[name]) for name in COMPARED if name in values},
-        compared_cells(model), 1, cpu, 1, False,
-        catenary=np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0),
-        at_edges={name: error[None] for name, error in at_edges.items()}, rods=rods_of([model.zones]),
-    )  # fmt: skip
+    found = {name: np.array(values[name]) for name in COMPARED if name in values}
+    catenary = np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0)
+    more: dict[str, Any] = {"catenary": catenary, "rods": rods_of([model.zones])}
+    more |= {"at_edges": {name: error[None] for name, error in at_edges.items()}}
+    return RunSample(run.resolution.lines[line.name], found, compared_cells(model), 1, cpu, **more)
 
 
 # Runs in threads beside each other: kernels release the GIL, and runs share nothing that they write.

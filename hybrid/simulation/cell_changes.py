@@ -122,18 +122,12 @@ class CellChanges(Remesh):
         return self._switching.table, z.blank_zone_job
 
     def _in_beside(self, k: int, _: int, m: int) -> dict[str, Any]:
-        return {
-            "line": self.line(k, m), "sea": self._sea_on(m), "old": self.state(k, 0, m), "new": self.state(k, 1, m),
-            "zones": self._zones_on(k, m),
-        }  # fmt: skip
+        return self._states_on(k, m) | {"zones": self._zones_on(k, m)}
 
     def _line_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
-        to, model = 1 - k, self.model
-        at = self._layout(to, m)
-        return {
-            "cable": model.line_maker.cable, "nodes": at.s, "base_of_cell": at.of, "rod": at.rods,
-            "line": self.line(to, m),
-        }  # fmt: skip
+        at, line = self._layout(1 - k, m), self.line(1 - k, m)
+        cells: dict[str, Any] = {"nodes": at.s, "base_of_cell": at.of, "rod": at.rods}
+        return cells | {"cable": self.model.line_maker.cable, "line": line}
 
     def _kinds_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
         to, model = 1 - k, self.model
@@ -149,29 +143,23 @@ class CellChanges(Remesh):
         to, switching = 1 - k, self._switching
         at = self._layout(to, m)
         match = self._match.view(m)._replace(single=self._match.view(n).single)
-        transfer = Transfer(
-            self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m),
-            self._layout(k, n).place, at.place, self._first[k], switching.kinks, self._clamps, self._held,
-            self._shifts, match,
-        )  # fmt: skip
-        return {
-            "transfer": transfer, "ends": self.model.ends.values, "sea": self._sea_on(n),
-            "target_sea": self._sea_on(m), "zones": self._zones_on(k, n), "target_zones": self._zones_on(to, m),
-            "numbers": self._numbers, "guided": switching.guided,
-        }  # fmt: skip
+        lines = self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m)
+        before, held = self._layout(k, n).place, (self._clamps, self._held, self._shifts)
+        transfer = Transfer(*lines, before, at.place, self._first[k], switching.kinks, *held, match)
+        around: dict[str, Any] = {"ends": self.model.ends.values, "sea": self._sea_on(n), "target_sea": self._sea_on(m)}
+        zones = {"zones": self._zones_on(k, n), "target_zones": self._zones_on(to, m)}
+        return around | zones | {"transfer": transfer, "numbers": self._numbers, "guided": switching.guided}
 
     def _renew_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         to = 1 - k
         at, of_old = self._layout(to, m), self._layout(k, n)
-        return {
-            "s": of_old.s, "rods": of_old.rods, "to_s": at.s, "to_rods": at.rods, "line": self.line(to, m),
-            "place": at.place, "of": at.of, "first": self._first[to], "marked": self._marked,
-            "state": self.state(to, 0, m), "twin": self.state(to, 1, m), "sea": self._sea_on(m),
-            "work": self._work_on(m), "zones": self._zones_on(to, m), "before": self._books(k, n),
-            "books": self._books(to, m), "push": self._push(k, parity, n), "new_push": self._push(to, 0, m),
-            "next_push": self._push(to, 1, m), "width": self._width(m), "nearest": self._itself.cells,
-            "scale": self.model.tension_scale, **self._along,
-        }  # fmt: skip
+        found: dict[str, Any] = {"s": of_old.s, "rods": of_old.rods, "to_s": at.s, "to_rods": at.rods}
+        found |= {"line": self.line(to, m), "place": at.place, "of": at.of, "first": self._first[to]}
+        found |= {"marked": self._marked, "nearest": self._itself.cells, "scale": self.model.tension_scale}
+        found |= {"state": self.state(to, 0, m), "twin": self.state(to, 1, m), "sea": self._sea_on(m)}
+        found |= {"work": self._work_on(m), "zones": self._zones_on(to, m), "width": self._width(m)}
+        found |= {"before": self._books(k, n), "books": self._books(to, m), "push": self._push(k, parity, n)}
+        return found | {"new_push": self._push(to, 0, m), "next_push": self._push(to, 1, m)} | self._along
 
     def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
         model, envelope = self.model, self._line.envelope
@@ -194,22 +182,18 @@ class CellChanges(Remesh):
             shaped(blank_renew_job, self._renew_job, *PAIRS),
         ]
         line, switch, kinds, renewed = range(4)
-        parts = [
-            Part(clear_state, renewed), Part(fill_line, line), Part(begin_switch, switch), Part(fill_kinds, kinds),
-            Part(end_switch, switch), Part(renew, renewed),
-        ]  # fmt: skip
+        parts = [Part(clear_state, renewed), Part(fill_line, line), Part(begin_switch, switch)]
+        parts += [Part(fill_kinds, kinds), Part(end_switch, switch), Part(renew, renewed)]
         return tables, parts, 3
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
         zones, tables = self._switching.zones, []
         for k in (0, 1):
             at, table = self._layout(1 - k, self.most), Table(blank_cell_planner)
-            table.bind(
-                plan=zones.plan, rod=zones.next_rod, parts=zones.parts, finest=self._finest, place=at.place, s=at.s,
-                of=at.of, rods=at.rods, first=self._first[1 - k], here=zones.here, at=self._at,
-                clock=self._run.loop.clock,
-                zone_clock=zones.clock, zone_counts=zones.counts, numbers=self._numbers, places=self._places,
-            )  # fmt: skip
+            table.bind(plan=zones.plan, rod=zones.next_rod, parts=zones.parts, here=zones.here, numbers=self._numbers)
+            table.bind(place=at.place, s=at.s, of=at.of, rods=at.rods, first=self._first[1 - k], finest=self._finest)
+            table.bind(at=self._at, clock=self._run.loop.clock, places=self._places)
+            table.bind(zone_clock=zones.clock, zone_counts=zones.counts)
             tables.append(table)
         return (cells_due, plan_cells, keep_places), tables, self._places.size
 

@@ -98,11 +98,9 @@ SNAP = 3.0
 TURNED = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
-REMEMBERED = (
-    "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off",
-    "_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink",
-    "_weight", "_lay", "_knot", "_bent", "_negative",
-)  # fmt: skip
+REMEMBERED: tuple[str, ...] = ("_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off")
+REMEMBERED += ("_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink", "_weight", "_lay")
+REMEMBERED += ("_knot", "_bent", "_negative")
 
 
 class LineStep(NamedTuple):
@@ -144,11 +142,10 @@ class Diagnostics:
         """What has been noted so far, and what `finish` will judge by."""
         clock, count = books.clock, books.counts
         known = {name: getattr(self, name) for name in REMEMBERED}
-        return known | {name: getattr(self.of_scheme, name) for name in watches.REMEMBERED} | {
-            "pulls": [float(clock.least_peak), float(clock.largest_peak)], "_rho": float(clock.rho),
-            "_moved": float(clock.moved), "_steps": int(count.measured),
-            "worst": books.worst[: min(int(count.measured), b.WORST)].copy(), "placed": books.placed,
-        }  # fmt: skip
+        known |= {name: getattr(self.of_scheme, name) for name in watches.REMEMBERED}
+        known |= {"pulls": [float(clock.least_peak), float(clock.largest_peak)], "_rho": float(clock.rho)}
+        known |= {"_moved": float(clock.moved), "_steps": int(count.measured), "placed": books.placed}
+        return known | {"worst": books.worst[: min(int(count.measured), b.WORST)].copy()}
 
     def restore(self, saved: Mapping[str, Any], books: Books, r: Floats) -> Floats:
         """Go on as `checkpoint` has written; ValueError where that cannot be.

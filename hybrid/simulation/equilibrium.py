@@ -167,15 +167,11 @@ def joined_lines(model: NetworkModel, t: float) -> list[JoinedLine]:
     lines = []
     for x, joints, fairleads, seats in zip(model.models, model.joints, model.fairleads, model.seats, strict=True):
         ends, floor, slackens = joined_ends(x.ends.at_time(t), joints), x.slack_floor, x.slack == "warn"
-        lines.append(
-            JoinedLine(
-                x.line, x.sea.at_time(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
-                model.rides, borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0),
-                x.payout is not None or x.layout is not None,
-                x.payout is not None and x.payout.holds_tension,
-                most_cells=x.most_cells,
-            )
-        )  # fmt: skip
+        borne = borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0)
+        keeps_pace = x.payout is not None or x.layout is not None
+        winds = x.payout is not None and x.payout.holds_tension
+        given = ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens, model.rides
+        lines.append(JoinedLine(x.line, x.sea.at_time(t), *given, borne, keeps_pace, winds, x.most_cells))
     return lines
 
 

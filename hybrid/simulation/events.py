@@ -49,9 +49,18 @@ class EventLog:
         self._waiting: list[tuple[tuple[float, float, float, str, str], dict[str, Any]]] = []
 
     def event(
-        self, t: float, s_a: float, s_b: float, kind: str, text: str, *, criterion: str = "", value: float = nan,
-        threshold: float = nan, energy: float = nan,
-    ) -> None:  # fmt: skip
+        self,
+        t: float,
+        s_a: float,
+        s_b: float,
+        kind: str,
+        text: str,
+        *,
+        criterion: str = "",
+        value: float = nan,
+        threshold: float = nan,
+        energy: float = nan,
+    ) -> None:
         """Something happened at time t (s) on s_a <= s <= s_b (m); the rest: as of `Recorder.event`."""
         more = {"criterion": criterion, "value": value, "threshold": threshold, "energy": energy}
         self._waiting.append(((t, s_a, s_b, kind, text), more))

@@ -47,8 +47,11 @@ NO_TABLE = np.zeros(0, np.int64)  # of which only the type counts
 SAMPLE = {
     "cable": {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 1}]},
     "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 0]}},
-    "initial": "equilibrium", "model": "adaptive", "mesh": {"cells": 8}, "time": {"duration": 0.1, "step": 0.1},
-}  # fmt: skip
+    "initial": "equilibrium",
+    "model": "adaptive",
+    "mesh": {"cells": 8},
+    "time": {"duration": 0.1, "step": 0.1},
+}
 
 
 def kernels_of(scene: Scene, static: bool = False) -> list[str]:

@@ -113,15 +113,11 @@ def observer_of(
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
     finest = model.finest_nodes if zones_move and follows_curvature(scene) and only is None else None
-    features = Features(
-        model.attached, section_changes(scene), model.hinges, kinds, finest, moves and model.payout is not None,
-        () if only else model.sea.names,
-    )  # fmt: skip
-    recorded = Recorded(
-        moves and only is None, only, criteria,
-        edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
-        gauges=() if only else scene.output.elevation or (), quantities=None if only else quantities_of(scene),
-    )  # fmt: skip
+    paid, obstacles = moves and model.payout is not None, () if only else model.sea.names
+    features = Features(model.attached, section_changes(scene), model.hinges, kinds, finest, paid, obstacles)
+    edges = moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED)
+    gauges, asked = () if only else scene.output.elevation or (), None if only else quantities_of(scene)
+    recorded = Recorded(moves and only is None, only, criteria, edges, gauges, asked)
     line = model.line if model.plane is None else planar(model.line, model.plane)
     line = as_begun(line, model.held, scene.dimension)
     observer = Observer(line, model.sea.values, model.zones, points, features, recorded)
@@ -144,13 +140,30 @@ class LineResult:
 
     cells: CellChanges | NodeChanges | None = None  # what changes cells, or lets nodes enter and leave, without Python
     _at_rest: tuple[Sequence[float], State]  # the sharpest bend and twist of an equilibrium, and its state
+    lets_touch = True  # whether contact begins by itself where the line comes near itself
+    nears_itself = parts_itself = False  # whether contact with itself has to begin, or to end
+    has_neared_itself = False  # whether that was so at some time
+    watched_by: LinesWatch | None = None  # whether it meets others, between which no contact is computed
+    plane: HasPlane | None = None  # of a line alone
+    contact: SelfContact | None = None
+    shares = False  # whether its contact is computed with that of other lines
+    manager: DomainManager | None = None  # of zones that move
+    shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
     _most = 1  # outputs that may wait
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
 
     def __init__(
-        self, number: int, name: str, scene: LineScene, model: Model, found: LinesAtRest | None, state: State,
-        outputs: int, wanted: Wanted, paying: PayingOut | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        number: int,
+        name: str,
+        scene: LineScene,
+        model: Model,
+        found: LinesAtRest | None,
+        state: State,
+        outputs: int,
+        wanted: Wanted,
+        paying: PayingOut | None,
+    ) -> None:
         """number: of the line in its network; found: the equilibrium that it starts from, or None.
 
         state: from which displacements count; outputs: after the first, 0 of an equilibrium; paying: the length of a
@@ -167,25 +180,16 @@ class LineResult:
         self.marked = marked_places(scene, model)
         self.envelope.itself.on &= wanted.record is not None or bool(model.line.bits & MAY_TOUCH)
         self.envelope.itself.renew(model)
-        self.lets_touch = True  # whether contact begins by itself where the line comes near itself
-        self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
-        self.has_neared_itself = False  # whether that was so at some time
-        self.watched_by: LinesWatch | None = None  # whether it meets others, between which no contact is computed
-        self.plane: HasPlane | None = None  # of a line alone
         self.recorder: Rows | ComparisonRecorder
         record = wanted.record
         self.recorder = ComparisonRecorder(FORCE_COLUMNS) if record is None else record(self, found, outputs)
         self.books = self._own_books(state)
         if self.envelope.quantities:
             self.books = self.envelope.quantities.given_to(self.books)
-        self.contact: SelfContact | None = None
-        self.shares = False  # whether its contact is computed with that of other lines
-        self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
         self._ratios: list[Floats] = []  # of criteria, where they are written
         self._aside: list[tuple[Model, Output]] = []  # that wait, each of a line of its own
-        self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._log: list[Floats] = []
 
     def _own_books(self, state: State) -> Books:
@@ -205,12 +209,10 @@ class LineResult:
         books.counts.stiff, books.counts.varies = self.model.inextensible, self.model.layout is not None
         books.clock.rho = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         books.clock.wave_step = wave_step(line, self.model.tension_scale)
-        return books._replace(
-            strains=np.zeros((nodes, STRAINS)), marks=marks, right=right, start=begin.copy(), base=base,
-            hinges=self.model.hinges, placed=begin[base], borne=1.0 + borne_strain(self.model),
-            extremes=no_extremes(nodes + marked.size),
-            touch=self._blank_touch(),
-        )  # fmt: skip
+        extremes, strains = no_extremes(nodes + marked.size), np.zeros((nodes, STRAINS))
+        books = books._replace(strains=strains, extremes=extremes, touch=self._blank_touch(), hinges=self.model.hinges)
+        books = books._replace(marks=marks, right=right, borne=1.0 + borne_strain(self.model))
+        return books._replace(start=begin.copy(), base=base, placed=begin[base])
 
     @property
     def sample_size(self) -> int:
@@ -584,26 +586,22 @@ class LineResult:
 
     def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""
-        return {
-            **self._kept(work), "stored": float(self.books.clock.stored), "ends": self.model.ends.checkpoint(),
-            "envelope": self.envelope.checkpoint(self.books.extremes),
-            "noted": self.diagnostics.checkpoint(self.books), "first_energy": self.observer.first_energy or 0.0,
-            **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
-        }  # fmt: skip
+        books, contact = self.books, self.contact
+        found = self._kept(work) | {"stored": float(books.clock.stored), "ends": self.model.ends.checkpoint()}
+        found |= {"envelope": self.envelope.checkpoint(books.extremes), "noted": self.diagnostics.checkpoint(books)}
+        found |= {} if contact is None else {"self_contact": contact.checkpoint(t)}
+        return found | {"first_energy": self.observer.first_energy or 0.0}
 
     def _kept(self, work: Work) -> dict[str, Any]:
         """Arrays of the line that a checkpoint keeps as they are; `before`: of what outputs in a step are made, too."""
         books, answers, asked = self.books, answers_of(work.torsion), self.observer.quantities
-        before = {
-            "imposed": books.imposed[0], "report": books.report[1], "tension": books.tension[0],
-            "twist": books.twist[0], "touch": books.touch[:1],
-        }  # fmt: skip
+        before = {"imposed": books.imposed[0], "report": books.report[1], "tension": books.tension[0]}
+        before |= {"twist": books.twist[0], "touch": books.touch[:1]}
         # from where excursions, m, and from which azimuths, deg, count that are recorded with the line
         places = {} if asked is None else {"first_places": asked.first, "first_turns": asked.turns}
-        return {
-            "work": books.work[0], "power": books.power[0], "report": work.report, "before": before,
-            **({"torsion": answers} if answers else {}), **{name: x for name, x in places.items() if x.size},
-        }  # fmt: skip
+        found: dict[str, Any] = {"work": books.work[0], "power": books.power[0], "report": work.report}
+        found |= {"before": before} | ({"torsion": answers} if answers else {})
+        return found | {name: x for name, x in places.items() if x.size}
 
     def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
         """Go on at t (s) as `checkpoint` has written; joints: as of `JoinedLine`.  ValueError: that cannot be."""

@@ -235,10 +235,8 @@ class SelfWatch:
     def _bound(self, states: tuple[State, State], clock: Clock, counts: Counts) -> Table:
         """What the kernel gets, of two states in turn."""
         model, job = self._model, Table(blank_itself_job)
-        job.bind(
-            line=model.line, ends=model.ends.values, old=states[0], new=states[1], clock=clock, counts=counts,
-            itself=self.itself,
-        )  # fmt: skip
+        job.bind(line=model.line, ends=model.ends.values, old=states[0], new=states[1])
+        job.bind(clock=clock, counts=counts, itself=self.itself)
         return job
 
     def attach(self, states: tuple[State, State], clock: Clock, counts: Counts) -> dict[str, Any]:
@@ -465,13 +463,13 @@ def _joined_by_place(network: Network, width: float) -> NDArray[np.int64]:
     return joined
 
 
+Pairs = Collection[tuple[int, int]]
+
+
 class LinesWatch:
     """What looks after every step whether two of such lines have met, or are near."""
 
-    def __init__(
-        self, network: Network, model: NetworkModel, met: set[tuple[int, int]], clock: Clock,
-        alone: Collection[tuple[int, int]] = (),
-    ) -> None:  # fmt: skip
+    def __init__(self, network: Network, model: NetworkModel, met: Pairs, clock: Clock, alone: Pairs = ()) -> None:
         """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""
         pairs, lines = watched_pairs(network, model), len(model.models)
         may, known = np.zeros((lines, lines), np.int64), np.zeros((lines, lines), np.int64)
@@ -488,10 +486,9 @@ class LinesWatch:
             row[: x.cells] = diameters(x)
         widest = max((float(x.max()) for x in width), default=0.0)
         self.joined = _joined_by_place(network, widest)
-        self._bound = {
-            "joined": self.joined, "begins": begins, "width": np.concatenate(width),
-            "clock": clock, "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
-        }  # fmt: skip
+        self._bound: dict[str, Any] = {"joined": self.joined, "begins": begins, "width": np.concatenate(width)}
+        self._bound |= {"clock": clock, "pairs": self._pairs, "room": self._room}
+        self._bound |= {"moved": np.zeros((len(width), MOVED))}
         self._most, self._jobs = most, (Table(blank_lines_job), Table(blank_lines_job))
 
     def width_of(self, number: int) -> Floats:

@@ -300,10 +300,8 @@ def _offsets_at(network: Network, at: str, distances: Sequence[float], heading: 
         tensions.append([_largest_tension(here, there, moved, l) for l in range(len(here.state.lines))])
     total = np.array(forces).reshape(-1, 3)
     by_line = dict(zip(model.names, np.array(tensions).reshape(len(forces), -1).T, strict=True))
-    return Offsets(
-        at, heading, np.array(distances, float), total,
-        np.array(moments).reshape(-1, 3) if kind == "body" or rigid else None, -total @ along, by_line,
-    )  # fmt: skip
+    about = np.array(moments).reshape(-1, 3) if kind == "body" or rigid else None
+    return Offsets(at, heading, np.array(distances, float), total, about, -total @ along, by_line)
 
 
 def _largest_tension(found: LinesAtRest, model: NetworkModel, network: Network, l: int) -> float:

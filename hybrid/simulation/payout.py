@@ -71,10 +71,8 @@ class PayingOut:
     def _blank(self, material: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(
-            material + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice, self.damped,
-            self._slips,
-        )  # fmt: skip
+        given = self.law, plan.pieces, self.winch, plan.layer, self.solves_twice, self.damped, self._slips
+        reel = blank_reel(material + self.rides, *given)
         numbers = reel.numbers
         numbers.side, numbers.far = (1.0 if plan.side else -1.0), plan.far
         numbers.spring = plan.cable.springs[plan.side]
@@ -242,10 +240,8 @@ class PayingOut:
             changed.line.ck[:], changed.line.law[:, SHIFT:] = model.line.ck[source], model.line.law[source, SHIFT:]
         reel, out = self._blank(material), state_for(changed.line)
         self._fit(changed.line, reel, length, run.t)  # what new cells lack goes by what they are made of
-        self._carrying.bind(
-            line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel, clock=run.clock,
-            tension=run.tension, nodes=self._nodes,
-        )  # fmt: skip
+        self._carrying.bind(line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel)
+        self._carrying.bind(clock=run.clock, tension=run.tension, nodes=self._nodes)
         carry_node(self._carrying.numbers)
         if out.layers.size:
             carry_layers(model.line, changed.line, state, out, old, reel)

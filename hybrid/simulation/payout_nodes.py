@@ -92,23 +92,19 @@ class NodeChanges(Remesh):
 
     def _in_beside(self, k: int, _: int, m: int) -> dict[str, Any]:
         work = self._work_on(m)
-        return {
-            "line": self.line(k, m), "sea": self._sea_on(m), "old": self.state(k, 0, m), "new": self.state(k, 1, m),
-            "report": work.report, "reel": self._reel(k, m), "X": work.X, "W": work.W,
-        }  # fmt: skip
+        reel = self._reel(k, m)
+        return self._states_on(k, m) | {"report": work.report, "reel": reel, "X": work.X, "W": work.W}
 
     def _node_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         """What a change from n cells, in the arrays of side k, to m is bound to."""
         model, to, before = self.model, 1 - k, self._books(k, n)
-        carry = CarryJob(
-            self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m), self._reel(k, n),
-            self._reel(to, m), self._run.loop.clock, before.tension, self._paying.plan.nodes,
-        )  # fmt: skip
-        job = NodeJob(
-            carry, self._whole, model.ends.values, self._sea_on(m), self._work_on(m), self.state(to, 1, m),
-            before, self._books(to, m), self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m),
-            self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale,
-        )  # fmt: skip
+        lines = self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m)
+        reels = self._reel(k, n), self._reel(to, m), self._run.loop.clock
+        carry = CarryJob(*lines, *reels, before.tension, self._paying.plan.nodes)
+        around = model.ends.values, self._sea_on(m), self._work_on(m), self.state(to, 1, m), before, self._books(to, m)
+        pushes = self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m)
+        rest = self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale
+        job = NodeJob(carry, self._whole, *(*around, *pushes, *rest))
         return job._asdict()
 
     def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:

@@ -148,10 +148,8 @@ def watch_beside(line: OfLine) -> LinesWatch | None:
 
 # What a line that changes so has not, of its fields and of those of its state: `Remesh` is not asked for one that has.
 NO_LAWS: dict[str, Floats] = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
-NO_MEMORY: dict[str, Floats] = {
-    "turn": NO_TURN, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK, "grip": NO_GRIP, "sheave": NO_SHEAVES,
-    "soil": NO_SOIL,
-}  # fmt: skip
+NO_MEMORY: dict[str, Floats] = {"turn": NO_TURN, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK}
+NO_MEMORY |= {"grip": NO_GRIP, "sheave": NO_SHEAVES, "soil": NO_SOIL}
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ITSELF = ("line", "old", "new", "itself")
@@ -381,12 +379,13 @@ class Remesh:
 
     # --- tables -------------------------------------------------------------------------------------
 
+    def _states_on(self, k: int, m: int) -> dict[str, Any]:
+        states: dict[str, Any] = {"old": self.state(k, 0, m), "new": self.state(k, 1, m)}
+        return states | {"line": self.line(k, m), "sea": self._sea_on(m)}
+
     def _in_run(self, k: int, _: int, m: int) -> dict[str, Any]:
-        return {
-            "line": self.line(k, m), "sea": self._sea_on(m), "old": self.state(k, 0, m), "new": self.state(k, 1, m),
-            "was": self._push(k, 0, m), "now": self._push(k, 1, m), "work": self._work_on(m),
-            "books": self._books(k, m),
-        }  # fmt: skip
+        pushes = {"was": self._push(k, 0, m), "now": self._push(k, 1, m)}
+        return self._states_on(k, m) | pushes | {"work": self._work_on(m), "books": self._books(k, m)}
 
     def _in_odd(self, k: int, _: int, m: int) -> dict[str, Any]:
         found = self._in_run(k, _, m)
@@ -428,16 +427,16 @@ class Remesh:
         ends = np.cumsum([0, *(len(x[0].table.numbers) for x in change)])
         calls = [(p.kernel.address(change[p.table][0].table.numbers), *ends[p.table : p.table + 2]) for p in parts]
         self._tables = of_run, of_odd, of_beside, of_itself, change, planners  # what is bound there stays alive
-        self._table.bind(
-            calls=self._calls, at=at, clock=run.loop.clock, own=books.clock, counts=run.loop.counts,
-            work=books.work, numbers=self._numbers, planners=np.array([x.numbers for x in planners]),
-            parts=np.array(calls, np.int64), change=np.zeros(ends[-1], np.int64),
-            changed=np.array([np.concatenate([x[pair].numbers for x in change], axis=1) for pair in range(len(PAIRS))]),
-            run=self._alone.numbers, run_places=in_run, in_run=np.array([x.numbers[:, in_run] for x in of_run]),
-            even=self._pairs[0][0].numbers, odd=self._pairs[0][1].numbers,
-            in_odd=np.array([x.numbers[:, in_run] for x in of_odd]), beside=beside.numbers, beside_places=in_beside,
-            in_beside=np.array([x.numbers[:, in_beside] for x in of_beside]), waiting=self._waiting, **numbers,
-        )  # fmt: skip
+        for name, of in (("in_run", of_run), ("in_odd", of_odd)):
+            numbers[name] = np.array([x.numbers[:, in_run] for x in of])
+        numbers["in_beside"] = np.array([x.numbers[:, in_beside] for x in of_beside])
+        changed = np.array([np.concatenate([x[pair].numbers for x in change], axis=1) for pair in range(len(PAIRS))])
+        self._table.bind(parts=np.array(calls, np.int64), change=np.zeros(ends[-1], np.int64), changed=changed)
+        self._table.bind(calls=self._calls, at=at, clock=run.loop.clock, own=books.clock, counts=run.loop.counts)
+        self._table.bind(work=books.work, numbers=self._numbers, planners=np.array([x.numbers for x in planners]))
+        self._table.bind(even=self._pairs[0][0].numbers, odd=self._pairs[0][1].numbers, waiting=self._waiting)
+        self._table.bind(run=self._alone.numbers, run_places=in_run, beside=beside.numbers, beside_places=in_beside)
+        self._table.bind(**numbers)
         at.task, at.per_node, at.number = self._alone.part("task").start, self.per_node, self._number
         for name, kernel in (("due", due), ("plan", plan), ("keep", keep)):
             setattr(self._calls, name, kernel.address(planners[0].numbers))

@@ -90,17 +90,22 @@ STEP_FIELDS = (
 
 
 def result_header(
-    scene: LineScene, model: Model, observer: Observer, texts: Mapping[str, Text], found: LinesAtRest | None,
-    envelope: Envelope, outputs: int, notes: Mapping[str, str],
-) -> Header:  # fmt: skip
+    scene: LineScene,
+    model: Model,
+    observer: Observer,
+    texts: Mapping[str, Text],
+    found: LinesAtRest | None,
+    envelope: Envelope,
+    outputs: int,
+    notes: Mapping[str, str],
+) -> Header:
     """What the result of a line states before its first output.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
     first, 0 of an equilibrium; notes: texts that are attributes of the result unless they are empty.
     """
-    attributes: dict[str, str | float | int] = {
-        "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
-    }  # fmt: skip
+    attributes: dict[str, str | float | int] = {"title": scene.title, "cells": model.cells, "length": model.length}
+    attributes["tension_scale"] = model.tension_scale
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
     attributes |= {name: text for name, text in notes.items() if text}

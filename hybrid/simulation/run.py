@@ -438,10 +438,15 @@ class Run(RecordedRun):
 
 
 def new_run(
-    network: Network, target: Target | None, text: Text, moves: bool,
-    resolution: NetworkResolution | None = None, recording: Recording = ALONE,
-    criterion: UserCriterion | None = None, changes: Sequence[LoadChange[Network]] = (),
-) -> Run:  # fmt: skip
+    network: Network,
+    target: Target | None,
+    text: Text,
+    moves: bool,
+    resolution: NetworkResolution | None = None,
+    recording: Recording = ALONE,
+    criterion: UserCriterion | None = None,
+    changes: Sequence[LoadChange[Network]] = (),
+) -> Run:
     """A run that stands at its start, or at a checkpoint.
 
     target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether its
@@ -464,9 +469,12 @@ def new_run(
 
 
 def _at_start(
-    network: Network, resolution: NetworkResolution | None, start: Start | None, moves: bool,
+    network: Network,
+    resolution: NetworkResolution | None,
+    start: Start | None,
+    moves: bool,
     criterion: UserCriterion | None,
-) -> First:  # fmt: skip
+) -> First:
     """The equilibrium of a network, or its lines as they are placed, unless its start is known."""
     if start is None:
         start = start_of(network, build_network(network, resolution=resolution), moves, criterion)

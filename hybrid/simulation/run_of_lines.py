@@ -395,10 +395,8 @@ def loaded_as(
             replace(x, line=touching.bits(x.line)) if k in touching.lines else x for k, x in enumerate(models)
         )
     supports = {(line, k): other.models[line].ends for line, k in model.supports}
-    return replace(
-        model, models=models, bodies=other.bodies, known=other.known, scenes=other.scenes, moments=other.moments,
-        supports=supports,
-    )  # fmt: skip
+    given = {name: getattr(other, name) for name in ("bodies", "known", "scenes", "moments")}
+    return replace(model, models=models, supports=supports, **given)
 
 
 def _line_as(name: str, now: Model, later: Model, network: Network, t: float) -> Model:

@@ -148,7 +148,7 @@ class PaidZones:
         given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.ramp_time, paying.foreseen)
         given[[0, -1]] = np.where(self._turning, 1, given[[0, -1]])
         manager.cable = paying.plan.held_as(model.cable)
-        change_base(manager, model.zoned, source, cells, given, model.line_maker, anew)
+        change_base(manager, model, source, cells, given, anew)
         self.switching.set_cells(model)
 
     def moving(self) -> MovingZones:
@@ -212,10 +212,9 @@ class RunPayout(Part):
         """What changes the length of a line, whose state of now is that before a step and after it."""
         run, paying, x = self._run, self.lines[k], solver.lines[k]
         books, work, state = run.lines[k].books, solver.work[k], run.state.lines[k]
-        job = ReelJob(
-            x.line, x.sea, x.ends, state, state, run.loop.clock, run.loop.counts, books.work,
-            books.velocity, work.report, paying.reel, work.X, work.W, moving_zones(self.zones.get(k)),
-        )  # fmt: skip
+        moving = moving_zones(self.zones.get(k))
+        given = run.loop.clock, run.loop.counts, books.work, books.velocity, work.report, paying.reel
+        job = ReelJob(x.line, x.sea, x.ends, state, state, *given, work.X, work.W, moving)
         return job._asdict()
 
     def attach(self, loop: NetworkSteps) -> None:

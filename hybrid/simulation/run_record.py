@@ -406,13 +406,11 @@ def checkpoint(run: RecordedRun) -> dict[str, Any]:
         line.name: line.checkpoint(work, run.t) | {"state": state._asdict(), "rho": float(line.books.clock.last_rho)}
         for line, work, state in zip(run.lines, run.solver.work, run.state.lines, strict=True)
     }
-    found: dict[str, Any] = {
-        "t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho, "loaded": run.loaded,
-        "interval": run.interval, "worked": run.loop.worked[1, :, :SPRING],
-        "leg": [*run.leg], "cpu": run.cpu, "bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING],
-        "lines": lines, "rest": run.rest, "control": run.loop.control(), "cuts": run.loop.cuts(),
-        **WITHOUT,
-    }  # fmt: skip
+    found: dict[str, Any] = {"t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho}
+    found |= {"loaded": run.loaded, "interval": run.interval, "leg": [*run.leg], "cpu": run.cpu, "rest": run.rest}
+    found |= {"worked": run.loop.worked[1, :, :SPRING], "body_work": run.solver.body_work[:, :SPRING]}
+    found |= {"bodies": run.state.bodies, "lines": lines, **WITHOUT}
+    found |= {"control": run.loop.control(), "cuts": run.loop.cuts()}
     for part in run.parts:
         found |= part.checkpoint()
     return found

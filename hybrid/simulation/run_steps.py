@@ -232,8 +232,8 @@ class Failures(Part):
 
     def _force(self, x: Weakness) -> float:
         """Force of the ends on their point, N."""
-        reports = [(self._run.solver.work[line].report, FORCE_A + 3 * k) for line, k in x.ends
-                   if (line, k) not in self._run.model.loose]  # fmt: skip
+        ends = [at for at in x.ends if at not in self._run.model.loose]
+        reports = [(self._run.solver.work[line].report, FORCE_A + 3 * k) for line, k in ends]
         return float(np.linalg.norm(sum((r[f : f + 3] for r, f in reports), np.zeros(3))))
 
     def checkpoint(self) -> dict[str, Any]:

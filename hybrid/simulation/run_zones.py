@@ -66,11 +66,9 @@ def note_change(events: EventLog, manager: DomainManager, t: float, change: Chan
     """Events of a change of zones at t (s) that the manager has adopted; booked: J, that it puts in."""
     base = manager.layout.base
     for k, why in enumerate(change.reasons):
-        events.event(
-            t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
-            criterion=why.criterion, value=why.value, threshold=why.threshold,
-            energy=booked if k == 0 else 0.0,  # of all that change now
-        )  # fmt: skip
+        energy = booked if k == 0 else 0.0  # of all that change now
+        more: dict[str, Any] = {"criterion": why.criterion, "value": why.value, "threshold": why.threshold}
+        events.event(t, float(base[why.a]), float(base[why.b]), why.kind, why.text, energy=energy, **more)
     cause = "" if manager.kinked else manager.cable.kinks_count
     if cause and (at := manager.joint_passed(change)) is not None:
         manager.kinked = True
@@ -117,10 +115,9 @@ class _LineZones:
 
     def _bind(self, run: RunOfLines, old: State, new: State, clock: b.Clock, counts: Counts, **more: int) -> Table:
         switching, model = self.switching, self.switching.model
-        switching.table.bind(
-            line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=clock, counts=counts,
-            work=run.lines[self.number].books.work, zones=switching.zones, near=switching.manager.near, **more,
-        )  # fmt: skip
+        switching.table.bind(line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, **more)
+        switching.table.bind(clock=clock, counts=counts, work=run.lines[self.number].books.work)
+        switching.table.bind(zones=switching.zones, near=switching.manager.near)
         return switching.table
 
 
@@ -466,27 +463,22 @@ class LineKinds:
             cable=model.line_maker.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
         )
         (first, second), base = states, np.zeros(layout.rod.size)
-        transfer = Transfer(
-            self._before, line, second, first, layout.places, layout.places, layout.first,
-            switching.kinks, self._clamps, self._held, np.ones(1, bool), blank_match(model.cells, model.cells),
-        )  # fmt: skip
+        held, match = (self._clamps, self._held, np.ones(1, bool)), blank_match(model.cells, model.cells)
+        places = layout.places, layout.places, layout.first, switching.kinks
+        transfer = Transfer(self._before, line, second, first, *places, *held, match)
         self._keeps = zones.keeps.copy()  # of the kinds before
-        self._switch.bind(
-            transfer=transfer, ends=ends, sea=sea, target_sea=sea, zones=zones._replace(keeps=self._keeps),
-            target_zones=zones,
-            numbers=self._numbers, guided=switching.guided,
-        )  # fmt: skip
+        self._switch.bind(transfer=transfer, ends=ends, sea=sea, target_sea=sea, target_zones=zones)
+        self._switch.bind(zones=zones._replace(keeps=self._keeps), numbers=self._numbers, guided=switching.guided)
         work, books, envelope, marked, nearest = around
         nodes, piece = line.s.size, model.cable.piece(0.5 * (line.s[1:] + line.s[:-1]))
-        self._renew.bind(
-            s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line, place=layout.places,
-            of=layout.base_of_cell, first=layout.first, start=envelope.start, marked=marks_on(line.s, marked),
-            borne=1.0 + model.cable.max_strain[piece], state=first, twin=second, sea=sea, work=work, zones=zones,
-            before=books, books=books, push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, envelope_s=envelope.s,
-            bounds=envelope.bounds, stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size),
-            width=np.zeros(0),
-            nearest=nearest, widths=base, scale=model.tension_scale,
-        )  # fmt: skip
+        self._renew.bind(s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line)
+        self._renew.bind(place=layout.places, of=layout.base_of_cell, first=layout.first, zones=zones)
+        self._renew.bind(start=envelope.start, envelope_s=envelope.s, bounds=envelope.bounds)
+        self._renew.bind(marked=marks_on(line.s, marked), borne=1.0 + model.cable.max_strain[piece])
+        self._renew.bind(state=first, twin=second, sea=sea, work=work, before=books, books=books)
+        self._renew.bind(push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, width=np.zeros(0), nearest=nearest)
+        self._renew.bind(stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size))
+        self._renew.bind(widths=base, scale=model.tension_scale)
 
     def change(self, change: Change, t: float) -> float:
         """Other kinds of cells from t (s) on: nothing moves; the energy, J, that is to be booked."""

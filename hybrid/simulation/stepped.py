@@ -83,6 +83,9 @@ def end_of_step(now: float, step: float | None, duration: float) -> float:
     return until if duration - until > SLIVER * step else duration
 
 
+Given = Sequence[float] | Floats | None
+
+
 def vector(x: Sequence[float] | Floats, name: str) -> Floats:
     value = numbers(x, name)
     if value.shape != (3,) or not all(map(isfinite, value.tolist())):
@@ -189,9 +192,8 @@ class SettableObstacles:
 
     @one_thread
     def set_obstacle(
-        self, name: str, position: Sequence[float] | Floats | None = None,
-        velocity: Sequence[float] | Floats | None = None, rotation: Floats | None = None,
-    ) -> None:  # fmt: skip
+        self, name: str, position: Given = None, velocity: Given = None, rotation: Floats | None = None
+    ) -> None:
         """Where an obstacle is to be at the end of the next step or `advance`, which it reaches smoothly.
 
         name: of one with `from_outside`; position: (3,) m of its place `at`, inertial, None: where it is; velocity:
@@ -303,12 +305,11 @@ def kept(run: Run) -> dict[str, Any]:
     run.write_log()
     run.ends_of_now()
     run.gather_events()
-    return {
-        "run": copied(checkpoint(run)), "model": run.model, "waiting": tuple(line.waiting() for line in run.lines),
-        "marks": marks_of(run), "before": run.other.copy(),
-        "stood": tuple((x.ends.values.position.copy(), x.ends.values.frame.copy()) for x in run.model.models),
-        "loads": tuple(model.ends.keep_loads() for model in run.model.models),
-    }  # fmt: skip
+    models = run.model.models
+    found = {"run": copied(checkpoint(run)), "model": run.model, "marks": marks_of(run), "before": run.other.copy()}
+    found |= {"stood": tuple((x.ends.values.position.copy(), x.ends.values.frame.copy()) for x in models)}
+    found |= {"loads": tuple(x.ends.keep_loads() for x in models)}
+    return found | {"waiting": tuple(line.waiting() for line in run.lines)}
 
 
 def bring_back(run: Run, saved: Saved) -> None:

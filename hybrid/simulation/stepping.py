@@ -90,9 +90,15 @@ class Simulation(SteppedPoints):
     """
 
     def __init__(
-        self, scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True,
-        criterion: UserCriterion | None = None, most_iterations: int | None = None, parts: Sequence[RunPart] = (),
-    ) -> None:  # fmt: skip
+        self,
+        scene: SceneLike,
+        output: str | Path | None = None,
+        *,
+        overwrite: bool = True,
+        criterion: UserCriterion | None = None,
+        most_iterations: int | None = None,
+        parts: Sequence[RunPart] = (),
+    ) -> None:
         most, parts = iterations_allowed(most_iterations), checked_parts(parts)
         self._read_scene(as_scene(scene))
         self.lock, self._stack, self._owner = threading.RLock(), ExitStack(), object()

@@ -90,11 +90,9 @@ def strand_of(line: Line, width: Floats, bending: Floats, tension_scale: float) 
         and bool((line.element * line.kb[:, 2])[[0, -1]].any())
         and bool(line.kb[line.element == 1, 2].all())
     )
-    return Strand(
-        widths, np.maximum(np.ceil(lengths / (SPACING * widths)), 1),
-        np.maximum(STIFFNESS * bends / widths**2, TENSION * tension_scale * (bends == 0.0)),
-        line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist),
-    )  # fmt: skip
+    samples = np.maximum(np.ceil(lengths / (SPACING * widths)), 1)
+    stiff = np.maximum(STIFFNESS * bends / widths**2, TENSION * tension_scale * (bends == 0.0))
+    return Strand(widths, samples, stiff, line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist))
 
 
 def contact_of_strands(strands: Sequence[Strand], friction: float) -> Contact:
@@ -172,12 +170,10 @@ class ContactBooks:
         latest = numbers.since == t
         grips = contact.fresh[: counts.fresh] if latest else contact.grips[: counts.grips]
         stored = float(numbers.tried if latest else numbers.stored)
-        return {
-            "speed": float(numbers.speed), "faded": float(numbers.faded), "quiet": float(numbers.quiet),
-            "stored": stored, "grips": grips.copy(), "remeshed": bool(counts.remeshed) and not latest,
-            "touch": self._touch[0].copy(), "samples": contact.samples.copy(), "mass": contact.mass.copy(),
-            "energy": self._energy_at(t),
-        }  # fmt: skip
+        found: dict[str, Any] = {name: float(getattr(numbers, name)) for name in ("speed", "faded", "quiet")}
+        found |= {"stored": stored, "grips": grips.copy(), "remeshed": bool(counts.remeshed) and not latest}
+        found |= {"touch": self._touch[0].copy(), "samples": contact.samples.copy(), "mass": contact.mass.copy()}
+        return found | {"energy": self._energy_at(t)}
 
     def _energy_at(self, t: float) -> list[float]:
         """Of the energy at the time t, s: that of the line (nan: unknown), balance, the largest; and tries given up."""
@@ -287,10 +283,9 @@ class SelfContact(ContactBooks):
     def attach(self, line: Line, ends: Ends, states: tuple[State, State], work: Work, books: Books) -> np.ndarray:
         """The table of the kernel for a run; `call` has its address then."""
         old, new = states
-        self._job.bind(
-            line=line, ends=ends, old=old, new=new, work=work, clock=books.clock, counts=books.counts, call=self.call,
-            contact=self.contact, touch=books.touch, velocity=books.velocity, power=books.power, report=books.report,
-        )  # fmt: skip
+        self._job.bind(line=line, ends=ends, old=old, new=new, work=work, call=self.call, contact=self.contact)
+        self._job.bind(clock=books.clock, counts=books.counts, touch=books.touch)
+        self._job.bind(velocity=books.velocity, power=books.power, report=books.report)
         self._table, self._work, self._touch = self._job.numbers, work, books.touch
         self.call[ADDRESS] = contact_task.address(self._table)
         return self._table
@@ -511,17 +506,13 @@ class SharedContact(ContactBooks):
         """Table of the one line, and tables for both parities; numbers: (2, L, ..) jobs of all lines, books: theirs."""
         cells, last = self._line.h.size, books[self.last]
         work = no_work()._replace(u=np.zeros((cells + 1, 3)), x=np.zeros((cells + 1, 5)))
-        self._inner.bind(
-            line=self._line, ends=no_ends(), old=blank_state(cells), new=blank_state(cells), work=work,
-            clock=last.clock, counts=np.zeros_like(last.counts), call=self.call, contact=self.contact,
-            touch=self._touch, velocity=np.zeros((2, 3)), power=np.zeros_like(last.power),
-            report=np.zeros_like(last.report),
-        )  # fmt: skip
+        self._inner.bind(line=self._line, ends=no_ends(), old=blank_state(cells), new=blank_state(cells), work=work)
+        self._inner.bind(clock=last.clock, counts=np.zeros_like(last.counts), call=self.call, contact=self.contact)
+        self._inner.bind(touch=self._touch, velocity=np.zeros((2, 3)))
+        self._inner.bind(power=np.zeros_like(last.power), report=np.zeros_like(last.report))
         for job, tables in zip(self._jobs, numbers, strict=True):
-            job.bind(
-                tables=tables, lines=np.array(self.lines, np.int64), begins=self.begins, starts=self.starts,
-                inner=self._inner.numbers, pushes=self._pushes, shares=self._shares, times=self._times,
-                meetings=self.meetings,
-            )  # fmt: skip
+            job.bind(tables=tables, lines=np.array(self.lines, np.int64), begins=self.begins, starts=self.starts)
+            job.bind(inner=self._inner.numbers, pushes=self._pushes, shares=self._shares)
+            job.bind(times=self._times, meetings=self.meetings)
         self.call[ADDRESS] = shared_task.address(self._jobs[0].numbers)
         return self._inner.numbers, (self._jobs[0].numbers, self._jobs[1].numbers)

@@ -153,26 +153,23 @@ def room_of_joints(lines: Sequence[JoinedLine], carried: Sequence[int], points: 
     columns = np.zeros((COLUMNS if turns else 3, max(sum(carried), 1), SIZE))
     own = 3 * points + 6 * len(bodies)
     unknowns = int((joints[:, 1] >= 0).sum()) + own
-    return {
-        "columns": columns, "functional": np.zeros(FUNCTIONAL), "parts": np.zeros_like(columns),
-        "answers": np.zeros((2, ANSWER)), "q": np.zeros(COLUMNS), "net": np.zeros((points, 3)), "bodies": bodies,
-        "work": np.zeros((len(bodies), WORK)), "S": np.zeros((HANDED - 1, HANDED)), "G": np.zeros((2, 6, 6)),
-        "A": np.zeros((unknowns + 5, unknowns + 1)), "right": np.zeros(own), "moves": np.zeros(3),
-    }  # fmt: skip
+    shapes: dict[str, Any] = {"functional": FUNCTIONAL, "answers": (2, ANSWER), "q": COLUMNS, "right": own, "moves": 3}
+    shapes |= {"net": (points, 3), "work": (len(bodies), WORK), "S": (HANDED - 1, HANDED), "G": (2, 6, 6)}
+    shapes |= {"A": (unknowns + 5, unknowns + 1)}
+    room: dict[str, Any] = {name: np.zeros(shape) for name, shape in shapes.items()}
+    return room | {"columns": columns, "parts": np.zeros_like(columns), "bodies": bodies}
 
 
 def room_to_meet(nodes: int, rides: NDArray[np.int64], bodies: int) -> Values:
     """Room of lines of so many nodes that touch the bodies that carry obstacles."""
     carriers = sorted({int(b) for b in rides if b >= 0})
-    slots, rows = np.full(bodies, -1, np.int64), EACH_BODY * len(carriers)
-    slots[carriers] = np.arange(len(carriers))
-    return {
-        "carriers": np.array(carriers, np.int64), "slots": slots,
-        "found": np.zeros(1 + len(carriers), np.int64), "touched": np.zeros((nodes * len(carriers), TOUCHED)),
-        "own": np.zeros((len(carriers), 36)), "wrench": np.zeros((len(carriers), 6)),
-        "responses": np.zeros((rows, nodes, SIZE)), "turned": np.zeros((rows, bodies, 6)),
-        "coupling": np.zeros((rows + 5, rows + 1)), **room_to_keep(nodes, bodies),
-    }  # fmt: skip
+    slots, count = np.full(bodies, -1, np.int64), len(carriers)
+    slots[carriers], rows = np.arange(count), EACH_BODY * count
+    shapes = {"touched": (nodes * count, TOUCHED), "own": (count, 36), "wrench": (count, 6)}
+    spaces = {"responses": (rows, nodes, SIZE), "turned": (rows, bodies, 6), "coupling": (rows + 5, rows + 1)}
+    whole = {"carriers": np.array(carriers, np.int64), "slots": slots, "found": np.zeros(1 + count, np.int64)}
+    room: dict[str, Any] = {name: np.zeros(shape) for name, shape in (shapes | spaces).items()}
+    return room | whole | room_to_keep(nodes, bodies)
 
 
 def room_of_unknowns(size: int, nodes: int, bodies: int) -> Values:
@@ -224,6 +221,10 @@ def _torques_of(twists: Sequence[bool]) -> Callable[[Sequence[int]], dict[str, A
     return lambda lines: {} if any(twists[k] for k in lines) else None
 
 
+Lines = Sequence[JoinedLine]
+SelfContacts = Sequence[SelfContact | None]
+
+
 class LineJobs:
     """Jobs of the lines of a network: of all, of those that are solved together, and of each by itself."""
 
@@ -234,9 +235,8 @@ class LineJobs:
     _part: JointJobs | None = None  # jobs of the lines that are solved together, where these are not all
 
     def __init__(
-        self, lines: Sequence[JoinedLine], bodies: Floats, contacts: Sequence[SelfContact | None],
-        shared: SharedContact | None, apart: bool,
-    ) -> None:  # fmt: skip
+        self, lines: Lines, bodies: Floats, contacts: SelfContacts, shared: SharedContact | None, apart: bool
+    ) -> None:
         """As of `NetworkSolver`."""
         self.lines, self.bodies, self.apart = tuple(lines), bodies, apart
         self._most_nodes = [1 + max(x.line.h.size, x.most_cells) for x in lines]  # cells may come and go in steps
@@ -288,10 +288,8 @@ class LineJobs:
         self._joined_tables = dict(enumerate(self._tables))
         for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
             limits = Limits(REACH * x.length, x.scale, 1)
-            self.bind_line(
-                k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
-                was=NO_PUSH, now=NO_PUSH,
-            )  # fmt: skip
+            self.bind_line(k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends)
+            self.bind_line(k, work=work, books=books, was=NO_PUSH, now=NO_PUSH)
         self._group()
 
     def _keeps(self, number: int, x: JoinedLine) -> bool:
@@ -322,17 +320,14 @@ class LineJobs:
             borders["winches"] = room_of_unknowns(self._winches, nodes, len(bodies))
         if self._sheaves:
             borders["sheaves"] = room_of_unknowns(self._sheaves, nodes, len(bodies))
-        rows = {
-            "joints": self.joints, "seats": self._seats, "arms": self._arms, "fairleads": self._fairleads,
-            "gaps": self._gaps, "still": np.zeros_like(self._gaps), "allowed": self.allowed,
-            "floors": np.array([-np.inf if x.slackens else x.floor for x in lines]),
-            "first": np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64),
-            "begins": np.append(0, np.cumsum(self._most_nodes)[:-1]).astype(np.int64),
-        }  # fmt: skip
-        whole = joints | {
-            "near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides, "phase": self._phase,
-            "marks": np.zeros(nodes, np.int64),
-        }  # fmt: skip
+        floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
+        first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
+        begins = np.append(0, np.cumsum(self._most_nodes)[:-1]).astype(np.int64)
+        rows: dict[str, Any] = {"joints": self.joints, "floors": floors, "first": first, "begins": begins}
+        rows |= {"seats": self._seats, "arms": self._arms, "fairleads": self._fairleads, "allowed": self.allowed}
+        rows |= {"gaps": self._gaps, "still": np.zeros_like(self._gaps)}
+        whole = joints | {"near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides}
+        whole |= {"phase": self._phase, "marks": np.zeros(nodes, np.int64)}
         return Rooms(
             whole, rows, {name: _always(x) for name, x in borders.items()} | {"torques": _torques_of(self._twists)}
         )
@@ -593,13 +588,12 @@ class LineJobs:
             table.bind(task=Task(RUN, limits=self.limits_by_itself(k)), **states)
             self._bind_pushes(k)
         numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
-        return {
-            "even": numbers, "odd": self._all.jobs[1].numbers,
-            "joined_even": self._together.jobs[0].numbers, "joined_odd": self._together.jobs[1].numbers,
-            "joined": np.array(self.joined, np.int64), "lone": self.lone_numbers,
-            "lone_lines": np.array(self.lone, np.int64), "marchers": np.array(self._marchers(), np.int64),
-            "leader": lead_lone.address(numbers) if mixes else 0, "finder": find_near.address(numbers) if mixes else 0,
-        }  # fmt: skip
+        together, marchers = self._together.jobs, np.array(self._marchers(), np.int64)
+        found: dict[str, Any] = {"even": numbers, "odd": self._all.jobs[1].numbers, "marchers": marchers}
+        found |= {"joined_even": together[0].numbers, "joined_odd": together[1].numbers, "lone": self.lone_numbers}
+        found |= {"joined": np.array(self.joined, np.int64), "lone_lines": np.array(self.lone, np.int64)}
+        finder, leader = (x.address(numbers) if mixes else 0 for x in (find_near, lead_lone))
+        return found | {"finder": finder, "leader": leader}
 
     def _marchers(self) -> list[int]:
         """Addresses of the kernels that solve steps of the lines that are solved by themselves."""

@@ -168,9 +168,13 @@ class Group(NamedTuple):
 
 
 def lines_at_rest(
-    group: Group, starts: Iterable[Start], others: Sequence[Start] = (), refused: Refused | None = None,
-    quick: bool = False, rubs: bool = True,
-) -> LinesAtRest:  # fmt: skip
+    group: Group,
+    starts: Iterable[Start],
+    others: Sequence[Start] = (),
+    refused: Refused | None = None,
+    quick: bool = False,
+    rubs: bool = True,
+) -> LinesAtRest:
     """Equilibrium of lines without friction; where none is found, with that which keeps them where they start.
 
     starts, others: as of `attempts`; refused: as of `first_sound`; quick: nothing but Newton from the first start, and
@@ -603,9 +607,14 @@ def _failed(lines: Sequence[JoinedLine], taken: NetworkTaken, states: NetworkSta
 
 
 def settled_network(
-    lines: Sequence[JoinedLine], points: int, bodies: Floats, start: NetworkState, contacts: Contacts,
-    keeps_turns: Callable[[NetworkState], tuple[int, str]], near: bool = False,
-) -> LinesAtRest:  # fmt: skip
+    lines: Sequence[JoinedLine],
+    points: int,
+    bodies: Floats,
+    start: NetworkState,
+    contacts: Contacts,
+    keeps_turns: Callable[[NetworkState], tuple[int, str]],
+    near: bool = False,
+) -> LinesAtRest:
     """Equilibrium of a network with contact of lines with themselves, from a start that is at rest and apart.
 
     points: how many free points there are; contacts: makes contact, without friction; keeps_turns: a line that has lost
@@ -637,10 +646,8 @@ def settled_network(
             why = lost or (taken.outcome.cause if taken.outcome != Outcome.OK else "found")
             path.append(f"{falls.name}: {why} ({total + iterations} iterations in all)")
             if taken.outcome == Outcome.OK and not lost:
-                return LinesAtRest(
-                    states, tuple(path), total + iterations, taken.residual, found, settled=True,
-                    unjudged=falls.unjudged, blurred=frozenset(found.blurred),
-                )  # fmt: skip
+                rest = LinesAtRest(states, tuple(path), total + iterations, taken.residual, found, settled=True)
+                return replace(rest, unjudged=falls.unjudged, blurred=frozenset(found.blurred))
             if taken.outcome == Outcome.UNSTABLE and falls.is_new(states):
                 break
         total += iterations

@@ -39,8 +39,8 @@ from hybrid.kernels.state.state import Floats, State, Work
 from hybrid.kernels.step.line_step import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, TOLERANCE, Limits, Task
 from hybrid.kernels.step.step import friction_axes
 from hybrid.kernels.step.step_control import REFUSED
-from hybrid.solve.contact import SelfContact, SharedContact, left_over
-from hybrid.solve.line_jobs import LineJobs
+from hybrid.solve.contact import SharedContact, left_over
+from hybrid.solve.line_jobs import LineJobs, Lines, SelfContacts
 from hybrid.solve.stability import ANCHOR, CONTACT_DAMPING, DAMPING, buckling_line, flaw_of_lines, stop
 from hybrid.solve.stepper import HEAVY, REACH, JoinedLine, NetworkState, NetworkTaken, Solution, lie_on_bed
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
@@ -67,10 +67,15 @@ class NetworkSolver(LineJobs):
     """
 
     def __init__(
-        self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
-        contacts: Sequence[SelfContact | None] = (), shared: SharedContact | None = None, tolerance: float = TOLERANCE,
+        self,
+        lines: Lines,
+        points: int,
+        bodies: Floats = NO_BODIES,
+        contacts: SelfContacts = (),
+        shared: SharedContact | None = None,
+        tolerance: float = TOLERANCE,
         apart: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Make tables of lines; each point and body must be at an end of some line.
 
         points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
@@ -122,10 +127,9 @@ class NetworkSolver(LineJobs):
             contact.set_states(old.lines[k], new.lines[k])
             self.books[k].counts.parity = 0
         limits = task.limits
-        self._asked[:] = (
-            task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
-            task.rho_before, task.fixed, t, 1.0, task.cut, limits.tolerance, task.cv, task.ca,
-        )  # fmt: skip
+        of_step = task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most
+        how = task.rho_before, task.fixed, t, 1.0, task.cut, limits.tolerance, task.cv, task.ca
+        self._asked[:] = (*of_step, *how)
         self._let_march()
         outcome, iterations, left, line, where = solve_network(self._all.jobs[0].numbers)
         return NetworkTaken(Outcome(outcome), iterations, left, line, where, self.residual())
@@ -254,9 +258,16 @@ class NetworkSolver(LineJobs):
     # --- motion -------------------------------------------------------------------------------------
 
     def step(
-        self, old: NetworkState, new: NetworkState, dt: float, rho: float, before: float, rho_before: float,
-        t: float = 0.0, most: int = MOST_OF_STEP,
-    ) -> NetworkTaken:  # fmt: skip
+        self,
+        old: NetworkState,
+        new: NetworkState,
+        dt: float,
+        rho: float,
+        before: float,
+        rho_before: float,
+        t: float = 0.0,
+        most: int = MOST_OF_STEP,
+    ) -> NetworkTaken:
         """From `old` to `new` (overwritten) over dt, with the ends and the sea of the new time in the lines' arrays.
 
         before, rho_before: the length, s, of the step that led to `old`, 0 if it is a start, and its spectral radius,
@@ -277,20 +288,21 @@ class NetworkSolver(LineJobs):
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
     def consistent_accelerations(
-        self, states: NetworkState, accelerations: Sequence[Floats], t: float = 0.0,
+        self,
+        states: NetworkState,
+        accelerations: Sequence[Floats],
+        t: float = 0.0,
         lengthening: Mapping[int, Floats] = MappingProxyType({}),
-    ) -> NetworkTaken:  # fmt: skip
+    ) -> NetworkTaken:
         """Give `states` the accelerations and tensions that positions, velocities and loads imply (solve.stepper).
 
         accelerations: (2, 3) m/s2 of the held ends of each line; lengthening: (N,) m/s2, second rates of the lengths of
         cells, by line.
         """
-        states.bodies[:, A:W] = 0.0
-        states.bodies[:, WA:] = 0.0
+        states.bodies[:, A:W] = states.bodies[:, WA:] = 0.0
         self._turning_gaps(states)
-        for k, (x, work, state, given) in enumerate(
-            zip(self.lines, self.work, states.lines, accelerations, strict=True)
-        ):
+        each = zip(self.lines, self.work, states.lines, accelerations, strict=True)
+        for k, (x, work, state, given) in enumerate(each):
             state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
             l = np.linalg.norm(state.e, axis=1)
             d = state.e / l[:, None]

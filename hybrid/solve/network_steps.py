@@ -74,13 +74,8 @@ def batch_of_rows(
         return rows[:, begin:at].reshape(count, *shape)
 
     t, sea, position, frame = part(), part(4), part(2, 3), part(2, 9)
-    spin, force, moment, report, work = (
-        part(2, 3),
-        part(2, 3),
-        part(2, 3),
-        part(REPORT_SIZE),
-        part(b.WORKS),
-    )
+    spin, force, moment = part(2, 3), part(2, 3), part(2, 3)
+    report, work = part(REPORT_SIZE), part(b.WORKS)
     r, v, vd = part(cells + 1, 3), part(cells + 1, 3), part(cells + 1, 3)
     e, T, a1, w = part(cells, 3), part(cells), part(cells, 3), part(cells)
     h, kb = (part(cells), part(cells + 1, 3)) if varies else (NOT_VARYING, NOT_VARYING)
@@ -88,10 +83,8 @@ def batch_of_rows(
     slipped = part(cells + 1, layers) if layers else NO_LAYERS_SEEN
     remembered = part(cells + 1, NO_SOIL.shape[1]) if soil else NO_SOIL_SEEN
     ends = np.repeat(held[None], count, axis=0)
-    return Batch(
-        t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
-        seen, slipped, remembered,
-    )  # fmt: skip
+    along, at_ends = (t, r, v, vd, e, T, a1, w), (ends, position, frame, spin, force, moment)
+    return Batch(*along, *at_ends, report, work, sea, h, kb, turn, touch, seen, slipped, remembered)
 
 
 def no_extremes(columns: int) -> Floats:
@@ -165,12 +158,10 @@ class NetworkSteps:
         self._cells = sum(x.line.h.size for x in solver.lines)
         self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
         self.worked[0] = solver.body_work
-        self._job.bind(
-            outputs=self.outputs, bodies=self.body_samples, worked=self.worked, clock=self.clock, counts=counts,
-            lines=self.lines, seen=self.seen, log=self._log,
-            limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm, solver.tolerance]),
-            sampler=sample_network.address(self._job.numbers), **jobs,
-        )  # fmt: skip
+        limits = np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm, solver.tolerance])
+        self._job.bind(outputs=self.outputs, bodies=self.body_samples, worked=self.worked, clock=self.clock)
+        self._job.bind(counts=counts, lines=self.lines, seen=self.seen, log=self._log, limits=limits)
+        self._job.bind(sampler=sample_network.address(self._job.numbers), **jobs)
         self._first = jobs["even"]
         return True
 

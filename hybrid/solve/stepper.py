@@ -40,10 +40,8 @@ HEAVY = 1e36
 # moments, drag, mass-proportional damping, stiffness-proportional damping, added mass, waves with
 # buoyancy at the surface, contact with the seabed, friction on it, zones that change, obstacles that move, what
 # materials lose that remember their past
-POWERS = (
-    "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact",
-    "friction", "zones", "obstacles", "hysteresis",
-)  # fmt: skip
+POWERS: tuple[str, ...] = ("start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass")
+POWERS += ("waves", "contact", "friction", "zones", "obstacles", "hysteresis")
 
 
 def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:

@@ -28,7 +28,7 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model, given_zones
 from hybrid.model.material import nodes_at
-from hybrid.model.mesh import Layout, LineOnBase, edges, on_other_parts
+from hybrid.model.mesh import Layout, edges, on_other_parts
 from hybrid.model.nearby import FEWER, MANY, picked
 from hybrid.model.payout import PayoutPlan, fastest
 from hybrid.model.resolution import Resolution, follows_curvature
@@ -37,7 +37,7 @@ from hybrid.scene.motion_checks import longest_period
 from hybrid.scene.schema import LineScene
 from hybrid.solve.stepper import NetworkTaken
 from hybrid.store.integrity import matched
-from hybrid.zones.manager import OF_BASE, Allowed, Change, DomainManager, Times, UserCriterion, shares_asked
+from hybrid.zones.manager import OF_BASE, OF_LINE, Allowed, Change, DomainManager, Times, UserCriterion, shares_asked
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many ramp times.
 LETTING_GO = 1.0
@@ -87,10 +87,8 @@ def transfer_to(
         sheave=np.zeros(state.sheave.shape),
         soil=np.zeros((len(state.soil) and target.h.size + 1, state.soil.shape[1])),
     )
-    return Transfer(
-        line, target, state, out, old.places, new.places, old.first, kinks, *clamps, np.array([shifts]),
-        blank_match(line.h.size, target.h.size),
-    )  # fmt: skip
+    kept, match = np.array([shifts]), blank_match(line.h.size, target.h.size)
+    return Transfer(line, target, state, out, old.places, new.places, old.first, kinks, *clamps, kept, match)
 
 
 class ZoneSwitching:
@@ -150,12 +148,9 @@ class ZoneSwitching:
         following = None
         if zones.clock.share > 0.0:
             following = {"true": zones.true, "idle_steps": zones.idle_steps, "waves": zones.waves}
-        return {
-            "following": following,
-            "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
-            "strain": zones.strain[1] if zones.counts.strained else NO_STRAIN,
-            "relaxing": relaxing,
-        }  # fmt: skip
+        found: dict[str, Any] = {"following": following, "manager": self.manager.checkpoint()}
+        found |= {"h": line.h, "kb": line.kb, "force": line.force, "relaxing": relaxing}
+        return found | {"strain": zones.strain[1] if zones.counts.strained else NO_STRAIN}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on as `checkpoint` has said; ValueError or ResultError where that cannot be."""
@@ -250,10 +245,8 @@ class ZoneSwitching:
         shifts = not self.zones.clock.share > 0.0
         transfer = transfer_to(old, new, line, target, state, self.kinks, self.clamps(ends), shifts)
         numbers[TIME], numbers[RELAXES] = t, before.counts.relaxing
-        self._switch_table.bind(
-            transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values, zones=before, target_zones=before,
-            numbers=numbers, guided=self.guided,
-        )  # fmt: skip
+        self._switch_table.bind(transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values)
+        self._switch_table.bind(zones=before, target_zones=before, numbers=numbers, guided=self.guided)
         begin_switch(self._switch_table.numbers)
         if self.zones.counts.holds_twist and not target.bits & PLANAR:
             carry_torque(line, target, ends, state, transfer.out, np.zeros(line.s.size + 1))
@@ -299,21 +292,20 @@ class ZoneSwitching:
 
 # The base cells of a line change while it is paid out: what the domain manager remembers of those that stay.
 
-# Arrays of `Zones` that have no base cells; of base cells; of cells.
-OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")
+# Arrays of `Zones` that have base cells, and cells.
 CARRIED = ("leaving", "grown", "ramp_factor")
 OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
 
 
 def change_base(
-    manager: DomainManager, layout: Layout, source: np.ndarray, of_cell: np.ndarray, given: np.ndarray,
-    on_base: LineOnBase, anew: bool = False,
-) -> None:  # fmt: skip
+    manager: DomainManager, model: Model, source: np.ndarray, of_cell: np.ndarray, given: np.ndarray, anew: bool
+) -> None:
     """Let a manager go on with base cells of which some have come or gone, where they are one cell each.
 
     source, of_cell: which of the old base cells (n,), and cells (N,), a new one is, or has come from; given: (n,) 1
     rod, -1 catenary, 0 adaptive; anew: for how many steps nodes could have gone is not known.
     """
+    layout, on_base = model.zoned, model.line_maker
     old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
     idle = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.idle_steps, source, layout.parts)
     waves = np.zeros(places) if anew else on_other_parts(manager.layout, old.waves, source, layout.parts)

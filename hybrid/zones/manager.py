@@ -241,11 +241,10 @@ OF_CLOCK = ("tolerance", "next_review", "total_twist", "age", "recent_age", "fas
 OF_ZONES = ("ratios", "grown", "leaving", "ramp_factor", "largest")
 
 
-# Arrays of `Zones` that are the same for every layout.
-OF_BASE = (
-    "clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits", "ratios", "rod",
-    "leaving", "grown", "ramp_factor", "parts", "H", "next_rod", "here", "plan", "idle_steps", "waves",
-)  # fmt: skip
+# Arrays of `Zones` that are the same for every layout: those without base cells first, those of planned nodes last.
+OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")
+OF_PLAN = ("next_rod", "here", "plan", "idle_steps", "waves")
+OF_BASE = (*OF_LINE, "ratios", "rod", "leaving", "grown", "ramp_factor", "parts", "H", *OF_PLAN)
 
 
 all_zones = Packed(lambda n: blank_zones(n, 1), given=(*OF_BASE, "kinds"))
@@ -506,14 +505,11 @@ class DomainManager:
         if self._review_room[0].size != n:
             self._review_room = np.zeros(n), np.zeros(n), np.zeros((4, n), bool)
         next_below, wait, flags = self._review_room
-        table.bind(
-            zone_table=zone_table, base=self.layout.base, given=self.given.astype(np.int64),
-            below_since=self.below_since, release_cause=self.release_cause, wait_factor=self.wait_factor,
-            seen=self.seen, buffer=self.buffer,
-            off=OFF, next_below=next_below, wait=wait, flags=flags, shortest=SHORTEST,
-            dwell=float(self.dwell), parts=BUFFER, light=1e-9 * self.scale, forced=FORCED_RATIO,
-            ramp_time=float(self.ramp_time), pause=1.0 / REVIEWS, held=int(self.held),
-        )  # fmt: skip
+        table.bind(zone_table=zone_table, base=self.layout.base, given=self.given.astype(np.int64), buffer=self.buffer)
+        table.bind(below_since=self.below_since, release_cause=self.release_cause, wait_factor=self.wait_factor)
+        table.bind(seen=self.seen, next_below=next_below, wait=wait, flags=flags, off=OFF, shortest=SHORTEST)
+        table.bind(dwell=float(self.dwell), ramp_time=float(self.ramp_time), pause=1.0 / REVIEWS, held=int(self.held))
+        table.bind(parts=BUFFER, light=1e-9 * self.scale, forced=FORCED_RATIO)
 
     def initial_rods(self, state: State) -> np.ndarray:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
