@@ -163,9 +163,13 @@ def _cache_warnings(console: Console) -> Iterator[None]:
     as_ever = warnings.showwarning
 
     def show(
-        message: Warning | str, category: type[Warning], filename: str, lineno: int,
-        file: TextIO | None = None, line: str | None = None,
-    ) -> None:  # fmt: skip
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
         if category.__name__ != "CacheWarning":  # its module imports what not every command needs
             as_ever(message, category, filename, lineno, file, line)
             return

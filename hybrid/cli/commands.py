@@ -313,9 +313,14 @@ async def _serve(file: Path | None, console: Console, no_browser: bool) -> None:
 
 @app.command()
 def run(
-    scene: SceneFile, output: RunFile = None, settings: Settings = None,
-    plot: Drawn = False, keep: Keep = False, quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    scene: SceneFile,
+    output: RunFile = None,
+    settings: Settings = None,
+    plot: Drawn = False,
+    keep: Keep = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Compute the motion of a cable and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
@@ -362,8 +367,13 @@ def resume(
 
 @app.command()
 def static(
-    scene: SceneFile, output: StaticFile = None, settings: Settings = None,
-    plot: Drawn = False, keep: Keep = False, quiet: Quiet = False, as_json: Json = False,
+    scene: SceneFile,
+    output: StaticFile = None,
+    settings: Settings = None,
+    plot: Drawn = False,
+    keep: Keep = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
     stiffness: Annotated[
         str | None, typer.Option(metavar="WHAT", help="Stiffness at body:NAME or point:NAME (a cable: start, end).")
     ] = None,
@@ -372,7 +382,7 @@ def static(
     ] = None,
     reach: Annotated[float | None, typer.Option(metavar="M", help=".. up to so many metres to either side ..")] = None,
     heading: Annotated[float, typer.Option(metavar="DEG", help=".. along a heading from the x axis.")] = 0.0,
-) -> None:  # fmt: skip
+) -> None:
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
@@ -461,11 +471,10 @@ def trade(
             _trade_levels(console, asked, folder, repeat, shlex.join(["hybrid", *(context.obj or [])]))
             return
         chosen = {"accuracies": accuracies} if accuracies else {}
+        command = shlex.join(["hybrid", *(context.obj or [])])
+        how: dict[str, Any] = {"models": models, "reference": reference, "target": target, "repeat": repeat} | chosen
         with console.study() as listener:
-            table = hybrid.trade(
-                asked, folder, models=models, **chosen, reference=reference, target=target, repeat=repeat,
-                progress=listener, command=shlex.join(["hybrid", *(context.obj or [])]),
-            )  # fmt: skip
+            table = hybrid.trade(asked, folder, **how, progress=listener, command=command)
         for row in table.rows:
             console.json("row", **(asdict(row) | judged(table, row)))
         console.show(lambda: trade_table(table))
@@ -529,9 +538,15 @@ def schema(lines: Annotated[bool, flag("--lines", help="Of scenes with points an
 
 
 def _ended(
-    console: Console, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool,
+    console: Console,
+    asked: Scene,
+    result: Result,
+    target: Path,
+    wall: float,
+    computed: float,
+    cold: bool,
     picture: Path | None,
-) -> None:  # fmt: skip
+) -> None:
     """Print the summary of a run that has ended; computed: s of it, by this command."""
     from hybrid.cli.tables import show_motion
 

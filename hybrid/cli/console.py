@@ -450,6 +450,7 @@ def _stamp(file: Path) -> tuple[int, int] | None:
 # Rows of a few words in columns: as text where they fit, by rich where they have to be wrapped.
 
 BETWEEN = 2  # blanks between columns
+Words = Sequence[str]
 
 
 class Trimmed:
@@ -493,10 +494,7 @@ class Grid:
         return Group(table, *([self.below] if self.below else []))
 
 
-def table_of(
-    heads: Sequence[str], rows: Iterable[Sequence[str]], words: Sequence[str] = ("",), free: Sequence[str] = (),
-    **how: Any,
-) -> Any:  # fmt: skip
+def table_of(heads: Words, rows: Iterable[Words], words: Words = ("",), free: Words = (), **how: Any) -> Any:
     """A table for rich without lines.
 
     words: heads of columns that are no numbers, which stand on the right; free: of those that may be wrapped; how: as

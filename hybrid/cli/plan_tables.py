@@ -132,14 +132,12 @@ def _table(rows: Mapping[str, str]) -> list[str]:
     """Names and texts, those that there are; a text that is too long for a line goes on in the next."""
     rows = {name: text for name, text in rows.items() if text}
     wide = max(NAME, *(len(name) + 2 for name in rows))
-    return [
-        line
-        for name, text in rows.items()
-        for line in wrap(
-            text, max(COLUMNS, wide + 40), initial_indent=f"{name:<{wide}s}", subsequent_indent=" " * wide,
-            break_long_words=False, break_on_hyphens=False,
-        )
-    ]  # fmt: skip
+    whole: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}  # words and keys
+    lines = []
+    for name, text in rows.items():
+        indents: dict[str, Any] = {"initial_indent": f"{name:<{wide}s}", "subsequent_indent": " " * wide}
+        lines += wrap(text, max(COLUMNS, wide + 40), **indents, **whole)
+    return lines
 
 
 def _contact(on: Mapping[str, str]) -> str:

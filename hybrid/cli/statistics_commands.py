@@ -119,11 +119,10 @@ def _row(
     deviation = line.deviation(name)
     at = int(deviation.argmax())
     known = name not in ADDED or bool(line.resolved(name)[at])
-    return {
-        "quantity": label, "unit": unit, "s": float(s[at]), "mean": float(mean[at]), "deviation": float(deviation[at]),
-        "valid": found.valid_for(name) and known,
-        "period": float(line.period(name)[at]), "largest": float(mean[at] + line.most_probable(name, hours)[at]),
-    }  # fmt: skip
+    row: dict[str, Any] = {"quantity": label, "unit": unit, "s": float(s[at]), "mean": float(mean[at])}
+    row |= {"deviation": float(deviation[at]), "valid": found.valid_for(name) and known}
+    largest = float(mean[at] + line.most_probable(name, hours)[at])
+    return row | {"period": float(line.period(name)[at]), "largest": largest}
 
 
 def _response_table(found: Response, rows: list[dict[str, Any]], hours: float) -> Any:
@@ -174,17 +173,12 @@ def modes(
         console.show(lambda: _modes_table(found))
         for note in found.notes:
             console.note(f"note: {note}")
-        console.json(
-            "modes", cells=found.cells, mass=found.mass.tolist(), notes=list(found.notes),
-            picture=None if picture is None else str(picture),
-            modes=[
-                {
-                    "period": x.period, "error": x.error, "frequency": x.frequency, "what": x.what,
-                    "energy": dict(x.energy), "mass": x.mass.tolist(),
-                }
-                for x in found.modes
-            ],
-        )  # fmt: skip
+        modes = []
+        for x in found.modes:
+            numbers = {"period": x.period, "error": x.error, "frequency": x.frequency, "what": x.what}
+            modes.append(numbers | {"energy": dict(x.energy), "mass": x.mass.tolist()})
+        whole = {"cells": found.cells, "mass": found.mass.tolist(), "notes": list(found.notes)}
+        console.json("modes", **whole, picture=picture and str(picture), modes=modes)
 
 
 def _modes_table(found: Modes) -> Any:
@@ -234,10 +228,15 @@ def stats(
         float | None, typer.Option(metavar="X", help="Also the part of the time below X, in the unit of the quantity.")
     ] = None,
     curve: Annotated[str | None, typer.Option(metavar="NAME", help="Fatigue damage by this curve ..")] = None,
-    strength: Strength = None, section: Section = None,
-    mooring: Mooring = None, factors: LoadFactors = None, pretension: Pretension = None,
-    line: LineName = None, quiet: Quiet = False, as_json: Json = False,
-) -> None:  # fmt: skip
+    strength: Strength = None,
+    section: Section = None,
+    mooring: Mooring = None,
+    factors: LoadFactors = None,
+    pretension: Pretension = None,
+    line: LineName = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
     """Statistics of a result, where each quantity is largest or at the places of --at.
 
     Mean, standard deviation, extremes, period, most probable maximum (MPM) and P90 in 3 h, fatigue damage and life.

@@ -67,8 +67,8 @@ def design(
         console.show(lambda: _identified(found) if isinstance(found, Identified) else _tables(found))
         for note in found.notes:
             console.note(f"note: {note}")
-        console.json("design", **_as_data(found), scene=None if output is None else str(output),
-                     picture=None if picture is None else str(picture))  # fmt: skip
+        files = {"scene": output and str(output), "picture": picture and str(picture)}
+        console.json("design", **_as_data(found), **files)
 
 
 def _as_data(found: Found) -> dict[str, Any]:
@@ -78,12 +78,11 @@ def _as_data(found: Found) -> dict[str, Any]:
         more[name] = [x._asdict() for x in more[name]]
     if own:
         more["correlations"] = found.correlations.tolist()  # type: ignore[attr-defined]
-    return more | {
-        "title": found.title, "numbers": dict(found.numbers), "start": dict(found.start),
-        "kept": [dataclasses.asdict(x) for x in found.kept], "bounds": [dataclasses.asdict(x) for x in found.bounds],
-        "minimised": found.minimised, "minimised_at_start": found.minimised_at_start, "equilibria": found.equilibria,
-        "runs": found.runs, "settled": found.settled, "notes": list(found.notes), "ways": dict(found.ways),
-    }  # fmt: skip
+    whole = ("title", "minimised", "minimised_at_start", "equilibria", "runs", "settled")
+    more |= {name: getattr(found, name) for name in whole}
+    more |= {name: [dataclasses.asdict(x) for x in getattr(found, name)] for name in ("kept", "bounds")}
+    more |= {name: dict(getattr(found, name)) for name in ("numbers", "start", "ways")}
+    return more | {"notes": list(found.notes)}
 
 
 def _tables(found: Found) -> Any:
@@ -196,10 +195,8 @@ def seek(
                 raise hybrid.ResultError(f"{output} exists\n    try:      another name")
             output.write_text(hybrid.scene_text(found.scene), encoding="utf-8")
         console.show(lambda: _design_table(found))
-        console.json(
-            "sought", numbers=dict(found.numbers), results=dict(found.results), targets=dict(found.targets),
-            equilibria=found.equilibria, scene=None if output is None else str(output),
-        )  # fmt: skip
+        facts: dict[str, Any] = {x: dict(getattr(found, x)) for x in ("numbers", "results", "targets")}
+        console.json("sought", **facts, equilibria=found.equilibria, scene=output and str(output))
 
 
 def _design_table(found: Sought) -> Any:
@@ -345,10 +342,8 @@ def study(
         console.left = f"{folder} keeps what is done; the same command goes on"
         begin = clock.perf_counter()
         with console.study_running() as listener:
-            found = hybrid.study(
-                source, folder, workers=workers, scheduler=scheduler, batch=batch, overwrite=overwrite,
-                progress=listener,
-            )  # fmt: skip
+            how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "batch": batch}
+            found = hybrid.study(source, folder, **how, overwrite=overwrite, progress=listener)
         _show(console, found, folder, clock.perf_counter() - begin, netcdf)
 
 
@@ -418,11 +413,9 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
             rows.append({"name": str(name), "unit": done[name].attrs.get("units", "")} | blank)
             continue
         worst = int(np.nanargmax(values))
-        rows.append({
-            "name": str(name), "unit": done[name].attrs.get("units", ""), "smallest": float(np.nanmin(values)),
-            "median": float(np.nanmedian(values)), "largest": float(values[worst]),
-            "case": int(done["case"].values[worst]),
-        })  # fmt: skip
+        row = {"name": str(name), "unit": done[name].attrs.get("units", ""), "smallest": float(np.nanmin(values))}
+        row |= {"median": float(np.nanmedian(values)), "largest": float(values[worst])}
+        rows.append(row | {"case": int(done["case"].values[worst])})
     return sorted(rows, key=lambda row: row["name"])
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hybrid.store.tables import Row, TradeTable
     from hybrid.studies.tradeoff import LevelTable
 
+Facts = dict[str, Any]
 ANCHORED = 1.0  # m
 LEVEL = 1e-9  # of the length: heights that differ by less are one, because equilibria are solved to about this
 
@@ -430,9 +431,8 @@ def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
 
 
 def _rows_beside(
-    points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]], end: float | None,
-    meetings: list[tuple[float, str]],
-) -> Iterator[tuple[str, str]]:  # fmt: skip
+    points: Facts, bodies: Facts, held: list[Facts], end: float | None, meetings: list[tuple[float, str]]
+) -> Iterator[tuple[str, str]]:
     """Rows of points and bodies, of lines that meet, and of what is held.
 
     end: s, time of the last output, of which points and bodies are; None: of an equilibrium; meetings: of lines, when
@@ -553,8 +553,8 @@ def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach:
 
 
 def show_holding(
-    console: Console, asked: Any, stiffness: str | None, offsets: str | None, reach: float | None, heading: float,
-) -> None:  # fmt: skip
+    console: Console, asked: Any, stiffness: str | None, offsets: str | None, reach: float | None, heading: float
+) -> None:
     """Print the stiffness at a point or body, and the forces on one that is held beside its equilibrium."""
     if stiffness is not None:
         found = hybrid.stiffness(asked, stiffness)
@@ -568,11 +568,10 @@ def show_holding(
             console.show(lambda: _matrix("of it, by the lines", found.lines))
     if offsets is not None and reach is not None:
         curve = hybrid.offsets(asked, offsets, np.linspace(-reach, reach, COUNT).tolist(), heading)
-        console.json(
-            "offsets", at=curve.at, heading=curve.heading, distance=curve.distance.tolist(),
-            force=curve.force.tolist(), moment=None if curve.moment is None else curve.moment.tolist(),
-            restoring=curve.restoring.tolist(), tension={k: v.tolist() for k, v in curve.tension.items()},
-        )  # fmt: skip
+        facts = {x: getattr(curve, x).tolist() for x in ("distance", "force", "restoring")}
+        facts |= {"moment": None if curve.moment is None else curve.moment.tolist()}
+        tension = {k: v.tolist() for k, v in curve.tension.items()}
+        console.json("offsets", at=curve.at, heading=curve.heading, **facts, tension=tension)
         console.show(lambda: _curve(curve))
 
 

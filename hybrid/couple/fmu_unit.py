@@ -32,10 +32,8 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import rotation
 from hybrid.simulation.stepping import Simulation
 
-UNITS = (
-    Unit("m", m=1), Unit("s", s=1), Unit("m/s", m=1, s=-1), Unit("rad", rad=1), Unit("N", kg=1, m=1, s=-2),
-    Unit("N.m", kg=1, m=2, s=-2),
-)  # fmt: skip
+OF_MOTION = Unit("m", m=1), Unit("s", s=1), Unit("m/s", m=1, s=-1), Unit("rad", rad=1)
+UNITS = (*OF_MOTION, Unit("N", kg=1, m=1, s=-2), Unit("N.m", kg=1, m=2, s=-2))
 # Of a communication step: how far the master's clock may be from that of the cable.
 CLOCK = 1e-6
 INPUTS = {
@@ -46,10 +44,8 @@ INPUTS = {
     "applied_moment": ("N.m", "moment on the free {} from the next step on"),
 }
 # What `Simulation.settable` says where these may be set.
-SET_BY = {
-    "position": "position", "velocity": "position", "rotation": "frame", "applied_force": "force",
-    "applied_moment": "moment",
-}  # fmt: skip
+SET_BY = {"position": "position", "velocity": "position", "rotation": "frame"}
+SET_BY |= {"applied_force": "force", "applied_moment": "moment"}
 # With the numbers of a `PointState` that they are.
 OUTPUTS = {
     "force": ("N", "force of its lines on the {}", 2),

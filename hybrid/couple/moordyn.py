@@ -100,12 +100,12 @@ class MoorDyn:
             id: f"point{id}" if f"point{id}" in scene.points else f"body{p.on}" for id, p in self.deck.points.items()
         }
         self.points = [MoorDynPoint(self, id, names[id]) for id in sorted(names)]
-        self.bodies = [
-            MoorDynBody(id, [*b.place, *np.radians(b.angles)], {
-                name: np.array(p.place) for name, p in scene.points.items()
-                if isinstance(p, Fairlead) and p.body == f"body{id}"
-            }) for id, b in sorted(self.deck.bodies.items()) if b.kind == "coupled"
-        ]  # fmt: skip
+        fairleads = {name: p for name, p in scene.points.items() if isinstance(p, Fairlead)}
+        self.bodies = []
+        for id, b in sorted(self.deck.bodies.items()):
+            if b.kind == "coupled":
+                own = {name: np.array(p.place) for name, p in fairleads.items() if p.body == f"body{id}"}
+                self.bodies.append(MoorDynBody(id, [*b.place, *np.radians(b.angles)], own))
         self.coupled = [
             x.name for x in self.points if self.deck.points[x.id].kind == "coupled" and x.name in scene.points
         ]
@@ -137,11 +137,10 @@ class MoorDyn:
                 [Complaint("left out", " ".join(row.cells), "coupled bodies, held points", fix, row.line)], deck.file
             )
         self.points = [MoorDynPoint(self, id, f"point{id}") for id in sorted(deck.points)]
-        self.bodies = [
-            MoorDynBody(id, [*b.place, *np.radians(b.angles)], {
-                f"point{k}": np.array(p.place) for k, p in deck.points.items() if p.on == id
-            }) for id, b in sorted(deck.bodies.items())
-        ]  # fmt: skip
+        self.bodies = []
+        for id, b in sorted(deck.bodies.items()):
+            own = {f"point{k}": np.array(p.place) for k, p in deck.points.items() if p.on == id}
+            self.bodies.append(MoorDynBody(id, [*b.place, *np.radians(b.angles)], own))
         self.coupled = [x.name for x in self.points if deck.points[x.id].kind == "coupled"]
         self.lines = []
 

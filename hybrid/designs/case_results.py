@@ -75,9 +75,12 @@ class Motions:
     """Computes runs, and counts them."""
 
     def __init__(
-        self, scenes: Mapping[str, Any], keys: Sequence[tuple[str, ...]], wanted: Sequence[tuple[str, str]],
+        self,
+        scenes: Mapping[str, Any],
+        keys: Sequence[tuple[str, ...]],
+        wanted: Sequence[tuple[str, str]],
         scene_of: Callable[[str, Floats], Any],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """wanted: case and result of every row; scene_of: of a case with values of unknowns.
 
         SceneError: a result that no run has.

@@ -215,12 +215,13 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
         for k, which in enumerate(("low", "high"))
         if np.isfinite(best.bounds[i, k])
     ]
-    return Found(
-        kept=tuple(_kept(c, price, point, finer) for c, price in rows), bounds=tuple(at),
-        minimised=None if objective is None else objective.value(point),
-        minimised_at_start=None if objective is None else objective.value(first), notes=tuple(notes),
-        settled=settled, **_common(task, asked, problem.equilibria, space, point, file),
-    )  # fmt: skip
+    kept, common = (
+        (_kept(c, price, point, finer) for c, price in rows),
+        _common(task, asked, problem.equilibria, space, point, file),
+    )
+    least, before = (None if objective is None else objective.value(x) for x in (point, first))
+    found = {"minimised": least, "minimised_at_start": before, "settled": settled, "notes": tuple(notes)} | common
+    return Found(kept=tuple(kept), bounds=tuple(at), **found)
 
 
 def _ran_off(space: Space, k: int, point: Point) -> str:
@@ -235,16 +236,14 @@ def _common(
     task: TaskFile[Design], asked: AnyScene, equilibria: Equilibria, space: Space, point: Point, file: str
 ) -> dict[str, Any]:
     """What a `Found` has whatever was asked."""
-    return {
-        "title": task.asked.title, "numbers": dict(zip(space.names, point.x.tolist(), strict=True)),
-        "start": dict(zip(space.names, space.start.tolist(), strict=True)), "equilibria": equilibria.count,
-        "runs": equilibria.motions.count, "moving": len(equilibria.motions.rows),
-        "keys": dict(zip(space.names, equilibria.keys, strict=True)),
-        "scene": scene_with(asked, equilibria.keys, point.x),
-        "scenes": {case: equilibria.scene(case, point.x) for case in equilibria.scenes},
-        "before": equilibria.point_of(space.start).shapes(), "after": point.shapes(), "bed": _bed(asked), "file": file,
-        "ways": dict(equilibria.motions.ways),
-    }  # fmt: skip
+    motions, by_name = equilibria.motions, {"numbers": point.x.tolist(), "start": space.start.tolist()}
+    by_name |= {"keys": equilibria.keys}
+    found: dict[str, Any] = {key: dict(zip(space.names, x, strict=True)) for key, x in by_name.items()}
+    found |= {"equilibria": equilibria.count, "runs": motions.count, "moving": len(motions.rows)}
+    found |= {"scene": scene_with(asked, equilibria.keys, point.x), "ways": dict(motions.ways), "bed": _bed(asked)}
+    found |= {"scenes": {case: equilibria.scene(case, point.x) for case in equilibria.scenes}, "file": file}
+    shapes = {"before": equilibria.point_of(space.start).shapes(), "after": point.shapes()}
+    return found | shapes | {"title": task.asked.title}
 
 
 def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identified:
@@ -257,11 +256,10 @@ def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identifie
     found["notes"] += tuple(
         f"{x.name} is at its bound ({x.which}): what was measured would have it beyond" for x in edges
     )
-    return Identified(
-        kept=(), bounds=tuple(edges), minimised=None, minimised_at_start=None, measured=_places(measured, point),
-        histories=_histories(measured, equilibria.point_of(space.start), point), **found,
-        **_common(task, asked, equilibria, space, point, file),
-    )  # fmt: skip
+    found |= {"measured": _places(measured, point), "bounds": tuple(edges)}
+    found |= {"histories": _histories(measured, equilibria.point_of(space.start), point)}
+    found |= _common(task, asked, equilibria, space, point, file)
+    return Identified(kept=(), minimised=None, minimised_at_start=None, **found)
 
 
 def _at_bounds(space: Space, point: Point) -> list[AtBound]:
@@ -287,13 +285,12 @@ def _places(measured: Measurements, point: Point) -> dict[str, dict[str, Floats]
 
 def _histories(measured: Measurements, first: Point, point: Point) -> tuple[MeasuredHistory, ...]:
     """What was measured over time beside runs with the numbers at the start and found."""
-    return tuple(
-        MeasuredHistory(
-            x.case, x.result, PROBES[quantity_of(x.result)].unit, x.t, measured.values[x.rows],
-            first.values[measured.rows[x.rows]], point.values[measured.rows[x.rows]],
-        )
-        for x in measured.histories
-    )  # fmt: skip
+    found = []
+    for x in measured.histories:
+        rows, unit = measured.rows[x.rows], PROBES[quantity_of(x.result)].unit
+        values = measured.values[x.rows], first.values[rows], point.values[rows]
+        found.append(MeasuredHistory(x.case, x.result, unit, x.t, *values))
+    return tuple(found)
 
 
 def _bed(scene: AnyScene) -> float | None:
@@ -312,10 +309,8 @@ def _reached(problem: Problem) -> Optimum:
 
 
 def _kept(c: Constraint, price: Price, point: Point, finer: Floats | None) -> Kept:
-    return Kept(
-        c.name, c.case, c.result, float(point.values[c.row]), c.bound, c.side, price.active, price.price,
-        None if finer is None else float(finer[c.row]),
-    )  # fmt: skip
+    value, by_cells = float(point.values[c.row]), None if finer is None else float(finer[c.row])
+    return Kept(c.name, c.case, c.result, value, c.bound, c.side, price.active, price.price, by_cells)
 
 
 def _refuse_what_fights(problem: Problem, point: Point) -> None:

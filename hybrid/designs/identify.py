@@ -99,13 +99,12 @@ def measurements(task: TaskFile[Design], scene: AnyScene) -> Measurements:
         expected = "a deviation of every column, because they are of several kinds"
         raise task.refusal([Finding(("measured", "deviations"), expected, "deviations: {z: 0.002, tension: 50}")])
     by_line = {key: (np.array(x)[:, 0], np.array(x)[:, 1:]) for key, x in places.items()}
-    return Measurements(
-        [*wanted], np.array(rows), np.array(values), None if np.isnan(stated).any() else stated, by_line,
-        tuple(
-            History(*key, np.array([row for _, row in found]), np.array([time for time, _ in found]))
-            for key, found in ((key, sorted(x)) for key, x in histories.items())
-        ),
-    )  # fmt: skip
+    over_time = []
+    for key, x in histories.items():
+        times, of_rows = (np.array(each) for each in zip(*sorted(x), strict=True))
+        over_time.append(History(*key, of_rows, times))
+    given = None if np.isnan(stated).any() else stated
+    return Measurements([*wanted], np.array(rows), np.array(values), given, by_line, tuple(over_time))
 
 
 def quantity_of(result: str) -> str:
@@ -272,16 +271,20 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> tuple[P
     scatter = math.sqrt(2.0 * best.cost / values.size) * (1.0 if known else float(scale[0]))
     notes += [f"the search stopped before it was done: {best.stopped}"] if best.stopped else []
     notes += _doubts(best, freedom, known) + _after_each_other(best.values, measured.histories)
-    return best.point, {
-        "estimates": estimates, "correlations": correlations, "apart": apart, "count": values.size, "scatter": scatter,
-        "notes": tuple(notes), "stated": known,
-    }  # fmt: skip
+    found = {"estimates": estimates, "correlations": correlations, "apart": apart, "count": values.size}
+    return best.point, found | {"scatter": scatter, "notes": tuple(notes), "stated": known}
 
 
 def _estimates(
-    names: Sequence[str], best: Rows, sizes: Floats, s: Floats, v: Floats, seen: np.ndarray, unit: float,
+    names: Sequence[str],
+    best: Rows,
+    sizes: Floats,
+    s: Floats,
+    v: Floats,
+    seen: np.ndarray,
+    unit: float,
     freedom: int | None,
-) -> tuple[tuple[Estimate, ...], Floats]:  # fmt: skip
+) -> tuple[tuple[Estimate, ...], Floats]:
     """Estimates and correlations; freedom: of a deviation that is estimated, too; None: it is stated."""
     covariance = (v[seen].T / s[seen] ** 2) @ v[seen] * unit**2
     spread = sizes * np.sqrt(np.diag(covariance))
@@ -301,9 +304,16 @@ def _estimates(
 
 
 def _by_cells(
-    equilibria: Equilibria, best: Rows, rows: np.ndarray, scale: Floats, u: Floats, s: Floats, v: Floats,
-    seen: np.ndarray, sizes: Floats,
-) -> tuple[Floats, list[str]]:  # fmt: skip
+    equilibria: Equilibria,
+    best: Rows,
+    rows: np.ndarray,
+    scale: Floats,
+    u: Floats,
+    s: Floats,
+    v: Floats,
+    seen: np.ndarray,
+    sizes: Floats,
+) -> tuple[Floats, list[str]]:
     """By how much unknowns change on cells half as long: one more step from there."""
     try:
         finer = equilibria.point_of(best.point.x, FINER)

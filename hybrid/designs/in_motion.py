@@ -174,9 +174,12 @@ def in_motion(asked: Scene, of: Sequence[str], by: Sequence[str]) -> Slopes:
 
 
 def by_tangents(
-    asked: Scene, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
+    asked: Scene,
+    wanted: Sequence[Wanted],
+    course: Course,
+    numbers: Mapping[str, float],
     sizes: Mapping[str, float],
-) -> Slopes:  # fmt: skip
+) -> Slopes:
     """Derivatives by tangents along the steps of one run; Unfollowed: they are not known of it.
 
     They are the means of those to both sides of a number, where the scene may have less of it; half of what these
@@ -210,9 +213,13 @@ def by_tangents(
 
 
 def followed(
-    asked: Scene, wanted: Sequence[Wanted], course: Course, pairs: Sequence[tuple[Any, Any | None]],
-    steps: Sequence[float], smooth: bool = False,
-) -> tuple[Motion, Floats, Floats]:  # fmt: skip
+    asked: Scene,
+    wanted: Sequence[Wanted],
+    course: Course,
+    pairs: Sequence[tuple[Any, Any | None]],
+    steps: Sequence[float],
+    smooth: bool = False,
+) -> tuple[Motion, Floats, Floats]:
     """A run, derivatives (P, W) of results by numbers, and parts of tangents (P,) by which these may be off.
 
     pairs: scenes with more of each number by a step, and with less of those that are to be seen from both sides.
@@ -241,9 +248,12 @@ def followed(
 
 
 def by_differences(
-    asked: Scene, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
+    asked: Scene,
+    wanted: Sequence[Wanted],
+    course: Course,
+    numbers: Mapping[str, float],
     sizes: Mapping[str, float],
-) -> Slopes:  # fmt: skip
+) -> Slopes:
     """Derivatives by differences of runs in the steps of one: four for each number."""
     base = Motion(asked, wanted, course)
     slopes, errors = (np.zeros((len(numbers), len(wanted))) for _ in range(2))
@@ -276,9 +286,15 @@ class Motion:
     """
 
     def __init__(
-        self, scene: Scene, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
-        finer: bool = False, smooth: bool = False, begun: Callable[..., None] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        scene: Scene,
+        wanted: Sequence[Wanted],
+        course: Course,
+        base: Motion | None = None,
+        finer: bool = False,
+        smooth: bool = False,
+        begun: Callable[..., None] | None = None,
+    ) -> None:
         """A run of a scene in the steps of a course.
 
         course, finer, begun: as of `replay`; smooth: extremes are those of parabolas in time and along the line, at

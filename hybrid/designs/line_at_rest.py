@@ -84,9 +84,14 @@ class LineAtRest:
     """One line in the equilibrium of a scene, and lines beside it, of scenes with other numbers."""
 
     def __init__(
-        self, scene: LineScene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = (),
+        self,
+        scene: LineScene,
+        model: Model,
+        state: State,
+        wanted: Sequence[Wanted],
+        free: Sequence[int] = (),
         frames: Frames = NO_FRAMES,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Results of a line at rest in a state.
 
         wanted: results; free: ends (0, 1) that are joined to free points or bodies; frames: of those that turn with

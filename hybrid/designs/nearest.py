@@ -57,9 +57,12 @@ class Rows(NamedTuple):
 
 
 def nearest(
-    residuals: Callable[[Floats], Rows], space: Space, least: float = 0.0, enough: float = GAIN,
+    residuals: Callable[[Floats], Rows],
+    space: Space,
+    least: float = 0.0,
+    enough: float = GAIN,
     refresh: Callable[[Point], bool] = lambda point: False,
-) -> Rows:  # fmt: skip
+) -> Rows:
     """Where the sum of squares of residuals is least, between the bounds.
 
     least: singular value below which a combination of unknowns stays what it is; enough: in place of GAIN;

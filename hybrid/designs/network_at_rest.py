@@ -268,10 +268,8 @@ def _refused(given: str, expected: str) -> SceneError:
 OF_ALL = ("environment", "obstacles", "output")
 OF_BODIES = (*OF_ALL, "points", "bodies")
 OF_CONTACT = ("self_contact", "energy/self_contact")  # results that contact of lines knows, and none of them alone
-OF_BODY = {
-    "mass", "centre", "inertia", "added_mass", "damping", "volume", "centre_of_buoyancy", "hydrostatics", "members",
-    "force", "moment",
-}  # fmt: skip
+OF_BODY = {"mass", "centre", "inertia", "added_mass", "damping", "volume", "centre_of_buoyancy"}
+OF_BODY |= {"hydrostatics", "members", "force", "moment"}
 
 
 # Places of nodes (`Resolution.places`) by line; empty: as the scene asks for.
@@ -308,13 +306,11 @@ class NetworkAtRest:
         self._order = [k for of_line in own for k in of_line]
         self._bodies = BodiesAtRest(solver, run.state, run.model)
         self._solver, self._states = solver, run.state
-        self.lines = [
-            LineAtRest(
-                self._scenes[name], run.model.models[l], run.state.lines[l], [wanted[k] for k in own[l]], self._free[l],
-                self._bodies.frames(l, solver.lines[l].seats),
-            )
-            for l, name in enumerate(self._names)
-        ]  # fmt: skip
+        self.lines = []
+        for l, name in enumerate(self._names):
+            asked, frames = [wanted[k] for k in own[l]], self._bodies.frames(l, solver.lines[l].seats)
+            what = self._scenes[name], run.model.models[l], run.state.lines[l]
+            self.lines.append(LineAtRest(*what, asked, self._free[l], frames))
         self.contact = self._contact(run.found, run.state, wanted)
         self._here = self._arms(run.model), self._loads(run.model, [x.here for x in self.lines])
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])

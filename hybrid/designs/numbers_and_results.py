@@ -175,9 +175,12 @@ def _put(value: Any, parts: list[str], number: float) -> Any:
 
 
 def text_of_found(
-    scene: Scene, file: str, keys: Mapping[str, Sequence[str]], numbers: Mapping[str, float],
+    scene: Scene,
+    file: str,
+    keys: Mapping[str, Sequence[str]],
+    numbers: Mapping[str, float],
     folder: str | Path | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """The scene as YAML.  file: what it was read from, "": nothing; folder: where the text is to go, None: anywhere.
 
     The text of the file, with its comments, stays where every number stands in it once, and names of other files mean

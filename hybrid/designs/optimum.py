@@ -7,7 +7,7 @@ price of the limit, what a unit of it is worth.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear, minimize
@@ -305,16 +305,18 @@ class _Search:
         space, x, n, penalty = self._problem.space, self._here.x, self._sizes.size, self._penalty
         low = np.maximum((space.low - x) / self._sizes, -width)
         high = np.minimum((space.high - x) / self._sizes, width)
-        inside = [] if not values.size else [{
-            "type": "ineq", "fun": lambda p: p[n] - values - slopes @ p[:n],
-            "jac": lambda p: np.hstack([-slopes, np.ones((values.size, 1))]),
-        }]  # fmt: skip
+        first = np.append(np.zeros(n), max(0.0, float(values.max(initial=0.0))))
+        how: dict[str, Any] = {"method": "SLSQP", "options": {"ftol": 1e-14, "maxiter": 200}}
+        how["bounds"] = [*zip(low, high, strict=True), (0.0, None)]
+        if values.size:
+            room, rates = lambda p: p[n] - values - slopes @ p[:n], np.hstack([-slopes, np.ones((values.size, 1))])
+            how["constraints"] = [{"type": "ineq", "fun": room, "jac": lambda p: rates}]
         found = minimize(
             lambda p: float(gradient @ p[:n] + 0.5 * p[:n] @ hessian @ p[:n] + penalty * p[n]),
-            np.append(np.zeros(n), max(0.0, float(values.max(initial=0.0)))), method="SLSQP", constraints=inside,
+            first,
             jac=lambda p: np.append(gradient + hessian @ p[:n], penalty),
-            bounds=[*zip(low, high, strict=True), (0.0, None)], options={"ftol": 1e-14, "maxiter": 200},
-        )  # fmt: skip
+            **how,
+        )
         p = np.clip(found.x[:n], low, high)
         return p, max(0.0, float((values + slopes @ p).max(initial=0.0)))
 

@@ -102,9 +102,13 @@ def refuse_push(result: Result) -> None:
 
 
 def replay(
-    scene: Scene, course: Course, finer: bool = False, more: Places | None = None,
-    each_step: bool = False, begun: Callable[..., None] | None = None,
-) -> Result:  # fmt: skip
+    scene: Scene,
+    course: Course,
+    finer: bool = False,
+    more: Places | None = None,
+    each_step: bool = False,
+    begun: Callable[..., None] | None = None,
+) -> Result:
     """A run into memory, in the steps and on the nodes of a course.
 
     finer: on nodes as the scene has them, cells and steps half as long.
@@ -120,9 +124,12 @@ def replay(
 
 
 def with_outputs(
-    scene: Scene, course: Course, more: Places | None = None, each_step: bool = False,
+    scene: Scene,
+    course: Course,
+    more: Places | None = None,
+    each_step: bool = False,
     finer: bool = False,
-) -> Network:  # fmt: skip
+) -> Network:
     """The network that computes a scene in a replay.
 
     more: outputs of lines are at their nodes and these arc lengths, m; None: where the scene asks for them;

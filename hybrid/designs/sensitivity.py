@@ -255,9 +255,14 @@ def _indices(study: str | Path, result: str, found: StudyResult) -> dict[str, tu
 
 
 def _shares(
-    found: StudyResult, result: str, text: str, names: list[str], x: Floats, g: Floats,
+    found: StudyResult,
+    result: str,
+    text: str,
+    names: list[str],
+    x: Floats,
+    g: Floats,
     indices: Mapping[str, tuple[float, float]],
-) -> Shares:  # fmt: skip
+) -> Shares:
     """x: (cases, P) values of variables; g: (P,) derivatives."""
     y = found.values[found.done]
     parts, spread = np.abs(g) * x.std(axis=0), float(y.std())

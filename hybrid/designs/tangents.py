@@ -173,52 +173,64 @@ def lie_in(plane: Floats, model: Model) -> bool:
 def unknown_of(model: Model) -> dict[str, bool]:
     """What kernels of tangents do not know of a line, and whether it has that."""
     line = model.line
-    return {
-        "the line may touch itself": bool(line.bits & SELF_CONTACT),
-        "vortices follow the motion": bool(line.bits & VORTICES),
-        "tension is no multiple of strain": line.law.size > 0,
-        "layers slip": line.slip_law.size > 0, "tension makes a torque": line.tension_torque.size > 0,
-        "a torque passes through catenary zones": line.torsion.size > 0, "obstacles move": line.moved.size > 0,
+    found = {"the line may touch itself": bool(line.bits & SELF_CONTACT), "soil remembers": bool(line.bits & SOIL)}
+    found |= {"vortices follow the motion": bool(line.bits & VORTICES)}
+    found |= {"friction of the bed": bool(line.bits & FRICTION), "obstacles move": line.moved.size > 0}
+    found |= {"tension is no multiple of strain": line.law.size > 0, "layers slip": line.slip_law.size > 0}
+    found |= {
+        "tension makes a torque": line.tension_torque.size > 0,
         "loads change in the run": bool(model.ends.breaks),
-        "friction of the bed": bool(line.bits & FRICTION), "soil remembers": bool(line.bits & SOIL),
-    }  # fmt: skip
+    }
+    return found | {"a torque passes through catenary zones": line.torsion.size > 0}
 
 
 def bind_other(
-    room: NDArray[np.int64], line: Line, ends: Ends, sea: Sea, moves: Moves, there: State, tangent: Tangent,
-    books: Books, same: bool,
-) -> tuple[Table, Floats]:  # fmt: skip
+    room: NDArray[np.int64],
+    line: Line,
+    ends: Ends,
+    sea: Sea,
+    moves: Moves,
+    there: State,
+    tangent: Tangent,
+    books: Books,
+    same: bool,
+) -> tuple[Table, Floats]:
     """Fill `room` with an OtherLine (kernels.watch.tangents) at `there`: its table, and its report.
 
     same: whether its waves are those of the run.
     """
     cells, table = line.h.size, Table(blank_other, room)
     work = workspace(cells)
-    table.bind(
-        line=line, sea=sea, ends=ends, moves=moves, even=there, odd=there.copy(), rates=tangent.rate,
-        spin=tangent.spin, before=tangent.rate.copy(), spin_before=tangent.spin.copy(), work=work,
-        books=books, left=np.zeros((cells + 1, 5)), sizes=tangent.sizes, same_waves=int(same), h=float(tangent.h),
-    )  # fmt: skip
+    table.bind(line=line, sea=sea, ends=ends, moves=moves, even=there, odd=there.copy(), work=work, books=books)
+    table.bind(rates=tangent.rate, spin=tangent.spin, sizes=tangent.sizes, h=float(tangent.h))
+    table.bind(before=tangent.rate.copy(), spin_before=tangent.spin.copy())
+    table.bind(left=np.zeros((cells + 1, 5)), same_waves=int(same))
     return table, work.report
 
 
 def bind_line(
-    line: Line, ends: Ends, sea: Sea, states: tuple[State, State], work: Work, clock: Clock,
-    counts: Counts, tables: NDArray[np.int64], found: NDArray[np.int64], same: bool,
-) -> tuple[Table, Floats]:  # fmt: skip
+    line: Line,
+    ends: Ends,
+    sea: Sea,
+    states: tuple[State, State],
+    work: Work,
+    clock: Clock,
+    counts: Counts,
+    tables: NDArray[np.int64],
+    found: NDArray[np.int64],
+    same: bool,
+) -> tuple[Table, Floats]:
     """A TangentJob of a line of a run, whose states take turns, and the report that it works with.
 
     same: whether waves of other lines are its own.
     """
     cells, table = line.h.size, Table(blank_tangent_job)
     own = workspace(cells)._replace(u=work.u)
-    table.bind(
-        line=line, sea=sea._replace(slid=np.zeros((cells + 1, 3)), bed=np.zeros((cells + 1, 3))), ends=ends,
-        even=states[0], odd=states[1], work=work, own=own, clock=clock, counts=counts,
-        left=np.zeros((cells + 1, 5)), last=states[0].a.copy(), ahead=np.zeros((cells + 1, 3)),
-        slopes=np.zeros(((cells + 1) * same, SLOPES)), lanes=np.zeros((PHASES + 2 * len(sea.waves), LANES)),
-        found=found, tables=tables,
-    )  # fmt: skip
+    around = sea._replace(slid=np.zeros((cells + 1, 3)), bed=np.zeros((cells + 1, 3)))
+    table.bind(line=line, sea=around, ends=ends, even=states[0], odd=states[1], work=work, own=own)
+    table.bind(clock=clock, counts=counts, found=found, tables=tables, last=states[0].a.copy())
+    table.bind(left=np.zeros((cells + 1, 5)), ahead=np.zeros((cells + 1, 3)))
+    table.bind(slopes=np.zeros(((cells + 1) * same, SLOPES)), lanes=np.zeros((PHASES + 2 * len(sea.waves), LANES)))
     return table, own.report
 
 
@@ -290,9 +302,13 @@ class NetworkOthers:
     """The networks of scenes with more of each number beside that of a run, and with less on its other side."""
 
     def __init__(
-        self, network: Network, scenes: Sequence[tuple[Network, Network | None]], steps: Sequence[float],
-        lines: Mapping[str, Resolution], more: Places | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        network: Network,
+        scenes: Sequence[tuple[Network, Network | None]],
+        steps: Sequence[float],
+        lines: Mapping[str, Resolution],
+        more: Places | None = None,
+    ) -> None:
         """Tangents of a run, by scenes whose numbers differ by a step.
 
         network: of the run; scenes: with more of each number by a step, and with less (None: it is not computed);
@@ -447,10 +463,14 @@ class NetworkOthers:
     # --- what kernels work with -------------------------------------------------------------------------
 
     def _bind(
-        self, solver: NetworkSolver, states: tuple[NetworkState, NetworkState], rests: bool = False,
-        clock: Clock | None = None, counts: Counts | None = None,
+        self,
+        solver: NetworkSolver,
+        states: tuple[NetworkState, NetworkState],
+        rests: bool = False,
+        clock: Clock | None = None,
+        counts: Counts | None = None,
         books: Callable[[int, int], Books] | None = None,
-    ) -> _Tables:  # fmt: skip
+    ) -> _Tables:
         """Tables for lines of a solver between states that take turns."""
         number, clock = len(self._others), b.Clock() if clock is None else clock
         counts = b.Counts() if counts is None else counts
@@ -464,36 +484,30 @@ class NetworkOthers:
                 same.append(bool(line.bits & WAVES) and same_waves(x.sea, there.sea))
                 state = beside(here, tangent.rate, tangent.spin, other.h)
                 some = books(p, l) if books is not None else b.blank_books(line.h.size)
-                table, report = bind_other(
-                    tables[p], at_rest(line) if rests else line, there.ends, there.sea,
-                    other.model.models[l].ends.moves(), state, tangent, some, same[-1],
-                )  # fmt: skip
+                own_line, moves = at_rest(line) if rests else line, other.model.models[l].ends.moves()
+                how = own_line, there.ends, there.sea, moves, state, tangent, some
+                table, report = bind_other(tables[p], *how, same[-1])
                 reports[p].append(report)
                 kept.append(table)
-            job, report = bind_line(
-                x.line, x.ends, x.sea, (here, states[1].lines[l]), solver.work[l], clock, counts, tables,
-                self._found[l], any(same),
-            )  # fmt: skip
+            what, both = (x.line, x.ends, x.sea), (here, states[1].lines[l])
+            job, report = bind_line(*what, both, solver.work[l], clock, counts, tables, self._found[l], any(same))
             own.append(report)
             jobs.append(job)
         turns, bodies = solver.swap_states(states), [self._bind_bodies(x, solver, states[0]) for x in self._others]
         asked, by, table = np.zeros(1, np.int64), np.zeros(2), Table(blank_network_tangents)
         even, odd = solver.jobs_of_joined()
-        table.bind(
-            even=even.numbers, odd=odd.numbers, joined=turns["joined"], lone=turns["lone_lines"],
-            lines=np.array([x.numbers for x in jobs]), bodies=np.array([x.numbers for x in bodies]), clock=clock,
-            counts=counts, asked=asked, by=by,
-        )  # fmt: skip
+        table.bind(even=even.numbers, odd=odd.numbers, joined=turns["joined"], lone=turns["lone_lines"])
+        table.bind(lines=np.array([x.numbers for x in jobs]), bodies=np.array([x.numbers for x in bodies]))
+        table.bind(clock=clock, counts=counts, asked=asked, by=by)
         return _Tables(table, asked, by, reports, own, [*kept, *jobs, *bodies, even, odd])
 
     def _bind_bodies(self, other: _Other, solver: NetworkSolver, state: NetworkState) -> Table:
         table, count = Table(blank_bodies), len(state.bodies)
         loads, history = table_of_loads(other.model.growing_loads(0.0))
-        table.bind(
-            numbers=other.model.body_numbers(0.0), fairleads=other.model.fairleads[solver.joined].copy(), loads=loads,
-            history=history, rates=other.bodies, before=np.zeros((count, TANGENTS)), old=state.bodies.copy(),
-            new=state.bodies.copy(), work=solver.body_work.copy(), right=np.zeros((count, 6)), h=other.h,
-        )  # fmt: skip
+        table.bind(numbers=other.model.body_numbers(0.0), fairleads=other.model.fairleads[solver.joined].copy())
+        table.bind(loads=loads, history=history, rates=other.bodies, before=np.zeros((count, TANGENTS)), h=other.h)
+        table.bind(old=state.bodies.copy(), new=state.bodies.copy(), work=solver.body_work.copy())
+        table.bind(right=np.zeros((count, 6)))
         return table
 
     def _call_each_step(self, reports: Sequence[Sequence[Floats]]) -> None:

@@ -141,8 +141,8 @@ def _write_cells(root: Any, part: Part, triangles: np.ndarray) -> tuple[np.ndarr
     for name in _CELLS:
         group = root.create_group(name)
         nothing = (empty, empty, empty, np.zeros(0, int))  # offsets of no cells: one 0 per part
-        kept = zip(("NumberOfCells", "NumberOfConnectivityIds", "Offsets", "Connectivity"), cells.get(name, nothing),
-                   strict=True)  # fmt: skip
+        named = "NumberOfCells", "NumberOfConnectivityIds", "Offsets", "Connectivity"
+        kept = zip(named, cells.get(name, nothing), strict=True)
         for key, value in kept:
             group[key] = value
     root["Steps/CellOffsets"], root["Steps/ConnectivityIdOffsets"] = cell_offsets, id_offsets

@@ -87,10 +87,8 @@ def _begin_to_compile(scene: Scene, compiling: Callable[[], None]) -> None:
 def _refused(complaint: Complaint) -> dict[str, Any]:
     """A complaint as the page shows it."""
     text = f"expected: {complaint.expected}" + (f"\ntry: {complaint.fix}" if complaint.fix else "")
-    return {
-        "line": complaint.line, "column": complaint.column, "where": complaint.where, "given": complaint.value,
-        "text": text,
-    }  # fmt: skip
+    found = {"line": complaint.line, "column": complaint.column, "where": complaint.where}
+    return found | {"given": complaint.value, "text": text}
 
 
 def _failed(error: ComputationError, text: str, file: str) -> dict[str, Any]:
@@ -202,11 +200,10 @@ def _along_line(line: Result, outputs: list[int], most: int) -> list[dict[str, A
         if clearance is not None:
             own["clearance"] = [_plain(line.s[kept]), _plain(clearance)]
         nodes = line.mesh[i].s if "mesh/s" in line else np.zeros(0)
-        out.append({
-            "s": _plain(line.s[kept]), **{axis: _plain(position[k, :, j]) for j, axis in enumerate("xyz")},
-            "along": own, "zones": [[z.kind, z.s_a, z.s_b, colour_of(z.kind)] for z in whole_zones(line.zones[i])],
-            "nodes": _plain(nodes) if len(nodes) <= MOST_NODES else [], "cells": max(len(nodes) - 1, 0),
-        })  # fmt: skip
+        shape = {"s": _plain(line.s[kept])} | {x: _plain(position[k, :, j]) for j, x in enumerate("xyz")}
+        zones = [[z.kind, z.s_a, z.s_b, colour_of(z.kind)] for z in whole_zones(line.zones[i])]
+        mesh = {"nodes": _plain(nodes) if len(nodes) <= MOST_NODES else [], "cells": max(len(nodes) - 1, 0)}
+        out.append(shape | {"along": own, "zones": zones} | mesh)
     return out
 
 

@@ -18,12 +18,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -37,10 +38,8 @@ LARGEST_MESSAGE = 2 * LARGEST_SCENE + 65_536
 MOST_BROWSERS = 32
 NAMES = ("127.0.0.1", "localhost")
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css", "txt": "text/plain"}
-PAGE = (
-    "live.css", "page.js", "editor.js", "space.js", "graphs.js", "codemirror/codemirror.js", "codemirror/yaml.js",
-    "codemirror/show-hint.js", "codemirror/codemirror.css", "codemirror/show-hint.css", "codemirror/LICENSE.txt",
-)  # fmt: skip
+EDITOR = "codemirror.js", "yaml.js", "show-hint.js", "codemirror.css", "show-hint.css", "LICENSE.txt"
+PAGE = ("live.css", "page.js", "editor.js", "space.js", "graphs.js", *(f"codemirror/{x}" for x in EDITOR))
 # The page asks nothing of other hosts, and cannot be shown within another page.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
@@ -51,10 +50,8 @@ REPORT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-HEADERS = {
-    "X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer", "Cache-Control": "no-store",
-    "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Resource-Policy": "same-origin",
-}  # fmt: skip
+HEADERS = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
+HEADERS |= dict.fromkeys(("Cross-Origin-Opener-Policy", "Cross-Origin-Resource-Policy"), "same-origin")
 
 
 class Guard:
@@ -140,10 +137,8 @@ def make_app(session: Session, port: int, token: str) -> Guard:
             await session.stop()
 
     at = f"/{token}"
-    routes = [
-        Route(f"{at}/", page), Route(f"{at}/schema.json", schema), Route(f"{at}/report", report),
-        WebSocketRoute(f"{at}/live", connected), Route(at + "/{name:path}", asset),
-    ]  # fmt: skip
+    routes: list[BaseRoute] = [Route(f"{at}/", page), Route(f"{at}/schema.json", schema), Route(f"{at}/report", report)]
+    routes += [WebSocketRoute(f"{at}/live", connected), Route(at + "/{name:path}", asset)]
     return Guard(Starlette(routes=routes, lifespan=lifespan), port, token)
 
 
@@ -206,10 +201,9 @@ def make_server(session: Session, at: socket.socket) -> tuple[uvicorn.Server, st
     """A server for a socket of `listen`, the address to open, and one that opens it once, for a command line."""
     port, token = at.getsockname()[1], secrets.token_urlsafe(24)
     app = make_app(session, port, token)
-    config = uvicorn.Config(
-        app, log_level="critical", access_log=False, server_header=False,
-        ws="websockets-sansio", ws_max_size=LARGEST_MESSAGE, ws_max_queue=8, timeout_graceful_shutdown=2,
-        proxy_headers=False, date_header=False, lifespan="on",
-    )  # fmt: skip
+    sockets: dict[str, Any] = {"ws": "websockets-sansio", "ws_max_size": LARGEST_MESSAGE, "ws_max_queue": 8}
+    silent: dict[str, Any] = {"log_level": "critical"}
+    silent |= dict.fromkeys(("access_log", "server_header", "proxy_headers", "date_header"), False)
+    config = uvicorn.Config(app, timeout_graceful_shutdown=2, lifespan="on", **sockets, **silent)
     root = f"http://127.0.0.1:{port}/"
     return uvicorn.Server(config), f"{root}{token}/", f"{root}{app.ticket}"

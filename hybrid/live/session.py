@@ -346,10 +346,8 @@ class Session:
     def _frames(self, begin: int) -> str:
         """Frames from that number on; those before it the page has."""
         assert self.playback is not None
-        return _message(
-            "frames", begin=begin, frames=self.playback.frames[begin:], head=self.playback.head,
-            running=self.playback.running, status=self.playback.status,
-        )  # fmt: skip
+        state = {"running": self.playback.running, "status": self.playback.status}
+        return _message("frames", begin=begin, frames=self.playback.frames[begin:], head=self.playback.head, **state)
 
     # ---- what stands above the pictures -------------------------------------------------------
 
@@ -360,13 +358,16 @@ class Session:
         state = {
             "file": path.name if path else None,
             "folder": str(document.folder if document is not None else path.parent if path else ""),
-            "editable": document is not None, "changed": document is not None and document.changed,
-            "disk": self._disk, "run": self.run.state if self.run is not None else None,
+            "editable": document is not None,
+            "changed": document is not None and document.changed,
+            "disk": self._disk,
+            "run": self.run.state if self.run is not None else None,
             "result": result.name if result is not None and result.exists() else None,
             "playing": playback.path.name if playback is not None else None,
             "computing": self._computing > 0.0 and clock.monotonic() - self._computing > 0.25,
-            "compiling": self.workers.compiling, "browsers": len(self._clients),
-        }  # fmt: skip
+            "compiling": self.workers.compiling,
+            "browsers": len(self._clients),
+        }
         return _message("state", **state)
 
     def _send_state(self) -> None:

@@ -48,11 +48,10 @@ class Process:
         """Start it, unless it was; it is asked at once, and answers when it is ready."""
         if self._child is not None:
             return
-        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-        self._child = await asyncio.create_subprocess_exec(
-            *own_process("from hybrid.live.workers import main; main()"), stdin=pipe, stdout=pipe, stderr=nothing,
-            limit=LONGEST_ANSWER, start_new_session=True,
-        )  # fmt: skip
+        call = own_process("from hybrid.live.workers import main; main()")
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        how: dict[str, Any] = pipes | {"limit": LONGEST_ANSWER, "start_new_session": True}
+        self._child = await asyncio.create_subprocess_exec(*call, **how)
 
     async def ask(self, asked: dict[str, Any]) -> bytes | None:
         """The JSON of its answer; None: the process has ended."""
@@ -157,11 +156,10 @@ class WatchedRun:
         """Start it, and follow it to its end."""
         new_group = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)  # of Windows: signals are for a group there
         asked = "run", _argument(self.scene), "-o", _argument(self.target), "--json"
-        self._child = child = await asyncio.create_subprocess_exec(
-            *own_process(CALL), *asked, cwd=self.scene.parent,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, limit=LONGEST_LINE,
-            start_new_session=True, creationflags=new_group,
-        )  # fmt: skip
+        pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        how: dict[str, Any] = {"cwd": self.scene.parent, "limit": LONGEST_LINE, "creationflags": new_group} | pipes
+        call = *own_process(CALL), *asked
+        self._child = child = await asyncio.create_subprocess_exec(*call, start_new_session=True, **how)
         assert child.stdout is not None
         if self._stopped:
             self._ask_to_stop()  # it was asked for while the process was being made

@@ -472,9 +472,13 @@ class Output(Table):
 # Units in which a size may be given, what they measure, and how much of the SI unit they are.
 UNITS = {
     "%": ("part", 0.01),
-    "mm": ("position", 1e-3), "cm": ("position", 1e-2), "m": ("position", 1.0),
-    "N": ("tension", 1.0), "kN": ("tension", 1e3), "MN": ("tension", 1e6),
-}  # fmt: skip
+    "mm": ("position", 1e-3),
+    "cm": ("position", 1e-2),
+    "m": ("position", 1.0),
+    "N": ("tension", 1.0),
+    "kN": ("tension", 1e3),
+    "MN": ("tension", 1e6),
+}
 _AMOUNT = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(%|[a-zA-Z]+)\s*")
 # Beyond a tenth nothing is computed that deserves the name; below a millionth round-off of long runs begins to show.
 ROUGHEST, FINEST = 0.1, 1e-6

@@ -224,8 +224,9 @@ class BendStiffener(Spread):
                 yield [Finding((given[0],), why, "leave one of the two out; modules over the same range have mass")]
             self._rows_cover_the_range()
             return
-        missing = [Finding((key,), f"a number ({unit}), or added_stiffness", f"add `{key}: ...` ({unit})")
-                   for key, unit in cone.items() if getattr(self, key) is None]  # fmt: skip
+        lacks = {key: unit for key, unit in cone.items() if getattr(self, key) is None}
+        number = "a number ({}), or added_stiffness"
+        missing = [Finding((key,), number.format(unit), f"add `{key}: ...` ({unit})") for key, unit in lacks.items()]
         if missing:
             yield missing
         assert self.diameters is not None and self.bore is not None

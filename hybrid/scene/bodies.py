@@ -96,8 +96,8 @@ _KEYS = {
     "cylinder": ("radius", "axis", "length"),
     "box": ("size", "rounding"),
 }
-_EXAMPLES = {"radius": "radius: 0.5", "axis": "axis: [0, 0, 1]", "length": "length: 2", "size": "size: [2, 1, 1]",
-             "rounding": "rounding: 0.1"}  # fmt: skip
+_VALUES = {"radius": "0.5", "axis": "[0, 0, 1]", "length": "2", "size": "[2, 1, 1]", "rounding": "0.1"}
+_EXAMPLES = {key: f"{key}: {value}" for key, value in _VALUES.items()}
 
 
 class BodyShape(Table):
@@ -152,11 +152,9 @@ class BodyShape(Table):
 def carried_shape(name: str, shape: BodyShape, origin: Triple, rotation: Triple) -> Carried:
     """The shape of a body as an obstacle, where its origin (m) and rotation (deg) are."""
     x, y, z = turned(rotation, shape.place)
-    given: dict[str, Any] = {
-        "at": (origin[0] + x, origin[1] + y, origin[2] + z), "friction": shape.friction,
-        "stiffness": shape.stiffness, "damping": shape.damping, "body": name, "origin": origin, "place": shape.place,
-        "body_axes": tuple(turned(rotation, x) for x in AXES),
-    }  # fmt: skip
+    given: dict[str, Any] = {x: getattr(shape, x) for x in ("friction", "stiffness", "damping", "place")}
+    given |= {"at": (origin[0] + x, origin[1] + y, origin[2] + z), "body": name, "origin": origin}
+    given["body_axes"] = tuple(turned(rotation, x) for x in AXES)
     if shape.size is not None and shape.rounding is not None:
         own = shape.rotation or (0.0, 0.0, 0.0)
         return CarriedBox(**given, size=shape.size, rounding=shape.rounding, rotation=own)

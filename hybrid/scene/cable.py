@@ -169,9 +169,12 @@ DENSITIES = (50.0, 25_000.0)  # kg/m^3, plausible ones, with room: from hollow a
 USUAL_DENSITIES = (300.0, 12_000.0)  # kg/m^3: what a corrected unit should lead to
 # Slips of units: the key, what its value is divided by, and the unit it was written in.
 _SLIPS = (
-    ("mass", 1e3, "in g/m or kg/km"), ("diameter", 1e3, "in mm"), ("diameter", 1e2, "in cm"), ("mass", 1e-3, "in t/m"),
+    ("mass", 1e3, "in g/m or kg/km"),
+    ("diameter", 1e3, "in mm"),
+    ("diameter", 1e2, "in cm"),
+    ("mass", 1e-3, "in t/m"),
     ("diameter", 0.5, "a radius"),
-)  # fmt: skip
+)
 
 
 def _other_units(density: float, mass: float, diameter: float) -> str:

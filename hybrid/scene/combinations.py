@@ -349,10 +349,10 @@ GOES_ITS_WAY = Feature(
 )
 ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
 ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
-CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step",
-                       _asks("time", "step", lambda x: x.step is None and x.tolerance is None))  # fmt: skip
-ESTIMATED = Feature("estimated errors, accuracy, steps that it chooses", "accuracy, output.errors, no time.step",
-                    _either(CHOSEN_STEPS, ACCURACY, ERRORS))  # fmt: skip
+_chosen_steps = _asks("time", "step", lambda x: x.step is None and x.tolerance is None)
+CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step", _chosen_steps)
+_ESTIMATED = "estimated errors, accuracy, steps that it chooses"
+ESTIMATED = Feature(_ESTIMATED, "accuracy, output.errors, no time.step", _either(CHOSEN_STEPS, ACCURACY, ERRORS))
 SETTLED_FRICTION = Feature(
     "friction that has settled in the equilibrium",
     "initial.friction",
@@ -361,14 +361,18 @@ SETTLED_FRICTION = Feature(
 
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
-OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
-                        "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
+_OTHER_MOTIONS = "motions that are no sum of harmonics, loads that change in time"
+OTHER_MOTIONS = Feature(_OTHER_MOTIONS, "motion.file, motion.travel, force.history", _changing_loads)
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
 
 RESPONSE_TO_MOTION = Refusal(
-    OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
-    "harmonics, and loads that stay", "hybrid run computes it in time",
-)  # fmt: skip
+    OTHER_MOTIONS,
+    RESPONSE,
+    "physics",
+    "a response by frequency is of what is constant or a sum of harmonics",
+    "harmonics, and loads that stay",
+    "hybrid run computes it in time",
+)
 REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TWO_STIFFNESSES, MOVING_ZONES, "physics",

@@ -387,12 +387,10 @@ class EndMotion:
             if curve is not None:
                 cubics[:-1, first : first + 3] = curve.c.transpose(1, 2, 0)
         ramped = velocity is not None and any(velocity)
-        return MotionTerms(
-            self._translates, self._rotates, harmonics, self._ramp or 0.0,
-            velocity or still, (self._ramp or 0.0) if ramped else 0.0,
-            (*travel.by, travel.begin, travel.over) if travel is not None else (*still, 0.0, 0.0),
-            self._follows, knots, cubics,
-        )  # fmt: skip
+        ramp = self._ramp or 0.0
+        way = (*travel.by, travel.begin, travel.over) if travel is not None else (*still, 0.0, 0.0)
+        steady = velocity or still, ramp if ramped else 0.0, way
+        return MotionTerms(self._translates, self._rotates, harmonics, ramp, *steady, self._follows, knots, cubics)
 
     def _translation(self, t: float) -> tuple[Array, Array]:
         if self._shift_spline is not None:

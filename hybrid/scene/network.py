@@ -522,9 +522,14 @@ class Network(SceneTables, Asked):
         return {"ends": Ends(**ends), "initial": initial}
 
     def _held_end(
-        self, name: str, key: Literal["start", "end"], held: tuple[Triple, Triple | None] | None, place: Triple,
-        motion: Motion | None, carrying: Sequence[str],
-    ) -> End:  # fmt: skip
+        self,
+        name: str,
+        key: Literal["start", "end"],
+        held: tuple[Triple, Triple | None] | None,
+        place: Triple,
+        motion: Motion | None,
+        carrying: Sequence[str],
+    ) -> End:
         """The end of a line at a point that is held, or is a body or a knot, where this is; held: as of `direction`."""
         clamp, moves = self.clamp(name, key), self.may_leave(name, key)
         given: dict[str, Any] = {"position": place, "motion": motion}

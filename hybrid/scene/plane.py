@@ -65,9 +65,13 @@ Witnessed = tuple[Environment, Ends, Initial]  # tables of a line that may say i
 
 
 def plane_of(
-    environment: Environment, cable: Cable, ends: Ends, initial: Initial, tolerance: float = EXACT,
+    environment: Environment,
+    cable: Cable,
+    ends: Ends,
+    initial: Initial,
+    tolerance: float = EXACT,
     beside: Sequence[Witnessed] = (),
-) -> tuple[Plane, list[Finding]]:  # fmt: skip
+) -> tuple[Plane, list[Finding]]:
     """The plane that a scene is in, or would be in but for what the findings say.
 
     tolerance: by what part of its length a vector may leave the plane; beside: of lines with which it shares a plane.

@@ -23,42 +23,48 @@ from hybrid.scene.base import (
     nearest,
 )
 
+AZIMUTH = "direction of the pull at the {end} in plan, from the x axis towards y, within half a turn of the first"
+EXCURSION = "horizontal distance of the touchdown point on the side of the {end} from its reference; NaN: no contact"
+OF_CLEARANCE = ("point", "normal", "path", "other", "diameter", "range")
 # Kinds: unit, what it is, which keys it needs, which it may have beside `line`, `smallest` and `largest`.
 KINDS: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...]]] = {
     "horizontal_force": ("N", "horizontal part of the pull of the line at its {end}", ("end",), ()),
     "vertical_force": ("N", "upward part of the pull of the line at its {end}", ("end",), ()),
     "force_along": ("N", "part of the pull of the line at its {end} along a direction", ("end", "direction"), ()),
     "declination": ("deg", "angle of the pull at the {end} to straight up (down: 180)", ("end",), ()),
-    "azimuth": (
-        "deg", "direction of the pull at the {end} in plan, from the x axis towards y, within half a turn of the first",
-        ("end",), (),
-    ),
+    "azimuth": ("deg", AZIMUTH, ("end",), ()),
     "end_angle": ("deg", "angle of the pull at the {end} to a direction (hang-off angle)", ("end", "direction"), ()),
     "uplift": ("N", "force that lifts what holds the {end} off the seabed, along its normal", ("end",), ()),
     "uplift_angle": ("deg", "angle of the pull at the {end} to the seabed; 0 where it does not lift", ("end",), ()),
     "touchdown": ("m", "arc length of the touchdown point on the side of the {end}; NaN: none", ("end",), ()),
-    "touchdown_excursion": (
-        "m", "horizontal distance of the touchdown point on the side of the {end} from its reference; NaN: no contact",
-        ("end",), ("reference",),
-    ),
+    "touchdown_excursion": ("m", EXCURSION, ("end",), ("reference",)),
     "layback": ("m", "horizontal distance from the {end} to {to}", ("end",), ("to",)),
-    "clearance": ("m", "least distance of the surface of the line to {what}", (), (
-        "point", "normal", "path", "other", "diameter", "range",
-    )),
-}  # fmt: skip
+    "clearance": ("m", "least distance of the surface of the line to {what}", (), OF_CLEARANCE),
+}
 # Names that results have already, as quantities, groups or coordinates; those of probes, too.
-TAKEN = (
-    "t", "s", "xyz", "edge", "gauge", "case", "position", "velocity", "tension", "theta", "phi", "curvature", "twist",
-    "bending_moment", "moment", "torque", "shear", "reaction_start", "reaction_end", "moment_start", "moment_end",
-    "end_force_start", "end_force_end", "contact", "self_contact", "contact_force", "grounded_length", "touchdown",
-    "touchdown_position", "wall_tension", "von_mises", "max_stress", "elevation", "elevation_at", "history", "seabed",
-    "seabed_x", "seabed_y", "seabed_height", "seabed_ends", "surface", "attached", "min_bend_radius", "max_tension",
-    "min_tension", "bending_stiffness", "diameter", "turns", "payout", "energy", "work", "errors", "criteria", "steps",
-    "right", "mesh", "envelope", "limits", "zones", "events", "points", "bodies", "lines", "times", "checkpoint",
-    "scene", "template", "word", "plane", "bounds", "ends", "self_distance", "extremes",
-    "stress_per_tension", "stress_per_curvature", "capacity_used", "capacity", "corner", "capacity_row",
-    "code_used", "code", "code_row", "code_number",
-)  # fmt: skip
+TAKEN: tuple[str, ...] = (
+    "t",
+    "s",
+    "xyz",
+    "edge",
+    "gauge",
+    "case",
+    "position",
+    "velocity",
+    "tension",
+    "theta",
+    "phi",
+    "curvature",
+)
+TAKEN += ("twist", "bending_moment", "moment", "torque", "shear", "reaction_start", "reaction_end", "moment_start")
+TAKEN += ("moment_end", "end_force_start", "end_force_end", "contact", "self_contact", "contact_force")
+TAKEN += ("grounded_length", "touchdown", "touchdown_position", "wall_tension", "von_mises", "max_stress")
+TAKEN += ("elevation", "elevation_at", "history", "seabed", "seabed_x", "seabed_y", "seabed_height", "seabed_ends")
+TAKEN += ("surface", "attached", "min_bend_radius", "max_tension", "min_tension", "bending_stiffness", "diameter")
+TAKEN += ("turns", "payout", "energy", "work", "errors", "criteria", "steps", "right", "mesh", "envelope", "limits")
+TAKEN += ("zones", "events", "points", "bodies", "lines", "times", "checkpoint", "scene", "template", "word")
+TAKEN += ("plane", "bounds", "ends", "self_distance", "extremes", "stress_per_tension", "stress_per_curvature")
+TAKEN += ("capacity_used", "capacity", "corner", "capacity_row", "code_used", "code", "code_row", "code_number")
 HALF_TURN = 180.0  # deg
 # The field with the arc length at which a clearance is least: its name after that of the clearance.
 WHERE = "_at"

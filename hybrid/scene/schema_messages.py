@@ -404,8 +404,8 @@ def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     if kind == "finite_number":
         return "give a finite number"
     if kind == "too_short":
-        least = next((m.min_length for _, marks in arms(spot.annotation, spot.metadata) for m in marks
-                      if isinstance(m, annotated_types.MinLen)), 1)  # fmt: skip
+        marks = (m for _, each in arms(spot.annotation, spot.metadata) for m in each)
+        least = next((m.min_length for m in marks if isinstance(m, annotated_types.MinLen)), 1)
         return f"give at least {least} entries" if least > 1 else "give at least one entry"
     if kind == "vector" and isinstance(value, str):
         return "write the numbers in brackets, with commas between them"

@@ -350,9 +350,13 @@ DENSEST = 25_000.0
 FOAM_TO_WATER = (20.0, 1000.0)  # kg/m^3, to which a corrected unit of what floats should lead
 # Slips of units: the key, the factor that corrects it, and what its value is then taken for.
 _SLIPS = (
-    ("mass", 1e3, "in t"), ("mass", 1e-3, "in g"), ("volume", 1e-3, "in litres"), ("volume", 1e-6, "in cm^3"),
-    ("volume", 1e3, "a thousand times too small"), ("volume", 1e6, "a million times too small"),
-)  # fmt: skip
+    ("mass", 1e3, "in t"),
+    ("mass", 1e-3, "in g"),
+    ("volume", 1e-3, "in litres"),
+    ("volume", 1e-6, "in cm^3"),
+    ("volume", 1e3, "a thousand times too small"),
+    ("volume", 1e6, "a million times too small"),
+)
 
 _WATER = "give environment.fluid, such as `fluid: {density: 1025}` (kg/m^3)"
 

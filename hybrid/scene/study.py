@@ -131,10 +131,8 @@ class Sample(Table):
             yield [Finding(("count",), f"a power of two, for {self.method}", f"{near} or {2 * near}")]
 
 
-TAKES = (
-    "max", "min", "mean", "median", "deviation", "skewness", "period", "significant", "extreme", "fractile", "damage",
-    "exceedance", "utilisation", "history", "profile",
-)  # fmt: skip
+MOMENTS = "max", "min", "mean", "median", "deviation", "skewness", "period", "significant"
+TAKES = (*MOMENTS, "extreme", "fractile", "damage", "exceedance", "utilisation", "history", "profile")
 
 
 # Limits of sections that quantities are held against in `utilisation`.

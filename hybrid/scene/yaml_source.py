@@ -213,8 +213,8 @@ def _build_table(
             continue
         parts = _KEY_AND_VALUE.fullmatch(key)
         if parts and not key_node.style and value_node.value == "":  # {z:-20} and {z -20} are a key without a value
-            complaints.append(Complaint(dotted((*path, parts[1])), key, "a key, a colon, a space, a value",
-                                        f"write `{parts[1]}: {parts[2]}`", *spot))  # fmt: skip
+            fix, expected = f"write `{parts[1]}: {parts[2]}`", "a key, a colon, a space, a value"
+            complaints.append(Complaint(dotted((*path, parts[1])), key, expected, fix, *spot))
             table.value[parts[1]] = from_text(parts[2])[0]
             table.value[parts[1]].place = table.key_places[parts[1]] = spot
             continue

@@ -97,9 +97,12 @@ def peaks_of(t: ArrayLike, x: ArrayLike) -> Floats:
 
 
 def of_record(
-    t: ArrayLike, x: ArrayLike, duration: float = THREE_HOURS, threshold: float | None = None,
+    t: ArrayLike,
+    x: ArrayLike,
+    duration: float = THREE_HOURS,
+    threshold: float | None = None,
     probability: float = FRACTILE,
-) -> Extreme:  # fmt: skip
+) -> Extreme:
     """The largest value of a history x (nt,) in a time of `duration` (s), by its peaks over a threshold.
 
     threshold: in the unit of x; None: the fractile USUAL_THRESHOLD of the peaks, but so that LEAST_PEAKS are left.
@@ -136,11 +139,9 @@ def of_record(
     def figure(part: float) -> tuple[float, tuple[float, float]]:
         return float(beyond(number, scale, shape, part)), _interval(beyond(numbers, scales, shapes, part))
 
-    return Extreme(
-        "weibull", *figure(1.0), *figure(math.log(2.0)), *figure(-math.log(probability)), probability, duration,
-        int(over.size), duration / float(times[-1] - times[0]),
-        f"Weibull, threshold {threshold:.6g}, scale {float(scale):.4g}, shape {float(shape):.4g}",
-    )  # fmt: skip
+    figures = *figure(1.0), *figure(math.log(2.0)), *figure(-math.log(probability)), probability, duration
+    law = f"Weibull, threshold {threshold:.6g}, scale {float(scale):.4g}, shape {float(shape):.4g}"
+    return Extreme("weibull", *figures, int(over.size), duration / float(times[-1] - times[0]), law)
 
 
 def of_maxima(
@@ -169,11 +170,9 @@ def of_maxima(
     def figure(above: float) -> tuple[float, tuple[float, float]]:
         return float(mode + scale * (shift + above)), _interval(modes + scales * (shift + above))
 
-    return Extreme(
-        "gumbel", *figure(0.0), *figure(-math.log(math.log(2.0))), *figure(-math.log(-math.log(probability))),
-        probability, duration, int(values.size), duration / record,
-        f"Gumbel, mode {float(mode):.6g}, scale {float(scale):.4g}",
-    )  # fmt: skip
+    figures = *figure(0.0), *figure(-math.log(math.log(2.0))), *figure(-math.log(-math.log(probability)))
+    law = f"Gumbel, mode {float(mode):.6g}, scale {float(scale):.4g}"
+    return Extreme("gumbel", *figures, probability, duration, int(values.size), duration / record, law)
 
 
 def check(duration: float, probability: float) -> None:

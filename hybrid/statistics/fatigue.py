@@ -66,11 +66,10 @@ def curves() -> Mapping[str, Curve]:
     rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
     found = {}
     for row in rows:
-        two = row["knee"] != ""
-        found[row["name"]] = Curve(
-            row["name"], row["kind"], float(row["log_a"]), float(row["m"]), float(row["log_a2"] or "nan"),
-            float(row["m2"] or "nan"), float(row["knee"]) if two else math.inf, float(row["thickness"]), row["source"],
-        )  # fmt: skip
+        first, second = (row["log_a"], row["m"]), (row["log_a2"] or "nan", row["m2"] or "nan")
+        a, b = (tuple(float(x) for x in pair) for pair in (first, second))
+        rest = float(row["knee"] or "inf"), float(row["thickness"]), row["source"]
+        found[row["name"]] = Curve(row["name"], row["kind"], a[0], a[1], b[0], b[1], *rest)
     return found
 
 

@@ -124,10 +124,8 @@ def summary(t: ArrayLike, x: ArrayLike) -> Summary:
             if found.ranges.size:
                 period[where] = (found.t[-1] - found.t[0]) / found.ranges.size
                 significant[where] = mean_of_largest_third(found.ranges)
-    return Summary(
-        mean, deviation, skewness, values.min(axis=0), times[low], values.max(axis=0), times[high], period,
-        significant, cycles,
-    )  # fmt: skip
+    extremes = values.min(axis=0), times[low], values.max(axis=0), times[high]
+    return Summary(mean, deviation, skewness, *extremes, period, significant, cycles)
 
 
 class Cycles(NamedTuple):

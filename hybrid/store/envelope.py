@@ -19,16 +19,11 @@ SCALE = f"{GROUP}/s"
 BEGIN = f"{GROUP}/begin"
 END = f"{GROUP}/end"
 # What limits are held against.
-_HELD = (
-    ("min_bend_radius", "curvature", "max"), ("max_tension", "tension", "max"), ("min_tension", "tension", "min"),
-    ("max_contact_force", "contact", "max"), ("max_contact_force", "self_contact", "max"),
-    ("max_contact_force", "obstacle_contact", "max"),
-)  # fmt: skip
+_HELD = [("min_bend_radius", "curvature", "max"), ("max_tension", "tension", "max"), ("min_tension", "tension", "min")]
+_HELD += [("max_contact_force", x, "max") for x in ("contact", "self_contact", "obstacle_contact")]
 # Which limits there are of quantities that outputs may have beyond their envelope.
-LIMITED = {
-    "curvature": ("min_bend_radius",), "tension": ("max_tension", "min_tension"), "contact": ("max_contact_force",),
-    "self_contact": ("max_contact_force",), "von_mises": ("max_stress",),
-}  # fmt: skip
+LIMITED: dict[str, tuple[str, ...]] = dict.fromkeys(("contact", "self_contact"), ("max_contact_force",))
+LIMITED |= {"curvature": ("min_bend_radius",), "von_mises": ("max_stress",), "tension": ("max_tension", "min_tension")}
 # What presses on the line, by the quantity that has its force per length.
 PARTNERS = {"contact": "the seabed", "self_contact": "the line itself or another", "obstacle_contact": "an obstacle"}
 # Of limits not in N.

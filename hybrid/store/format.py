@@ -34,6 +34,7 @@ CACHE = 4 * _CHUNK_BYTES
 BLOCK = 512
 # Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.
 _KIND, _TEXT = "S32", "S512"
+ZoneRows = Sequence[tuple[str, float, float]]  # kinds, and from where to where, m
 INDEX = "index"  # description of a dimension that has no scale of its own
 STATUS_WIDTHS = {"status": 32, "message": 2048}  # bytes
 _RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events", "changes", "checkpoint"}
@@ -331,9 +332,13 @@ class ArrayContents:
     """What a `Result` reads from, as `store.records.FileContents`, of a result in memory."""
 
     def __init__(
-        self, data: Mapping[str, ArrayDataset], groups: Sequence[str], attributes: dict[str, Any],
-        texts: Mapping[str, Text], parts: Mapping[str, ArrayContents] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        data: Mapping[str, ArrayDataset],
+        groups: Sequence[str],
+        attributes: dict[str, Any],
+        texts: Mapping[str, Text],
+        parts: Mapping[str, ArrayContents] | None = None,
+    ) -> None:
         """groups: that are there even if they are empty; parts: results of lines by name, of a result of several."""
         self.parts = dict(parts or {})
         self.order = tuple(self.parts)

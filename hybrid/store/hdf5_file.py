@@ -455,10 +455,8 @@ def _copied_dataset(data: h5py.Dataset, new: h5py.Group, name: str, kept: Mappin
     grows = data.chunks is not None
     if grows:  # a result that was written in one go has all its rows in one chunk
         rows = min(data.chunks[0], chunk_rows(data.dtype.itemsize * int(np.prod(data.chunks[1:], dtype=int))))
-    copy = new.create_dataset(
-        name, shape, data.dtype, maxshape=data.maxshape if grows else None,
-        chunks=(rows, *data.chunks[1:]) if grows else None,
-    )  # fmt: skip
+    how = {"maxshape": data.maxshape, "chunks": (rows, *data.chunks[1:])} if grows else {}
+    copy = new.create_dataset(name, shape, data.dtype, **how)
     if not data.ndim:
         copy[()] = data[()]
     else:

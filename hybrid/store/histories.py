@@ -23,10 +23,8 @@ Floats = np.ndarray
 Window = tuple[float | None, float | None]
 
 # What is looked at when nothing is asked for, where the result has it; and all that its scene asks for by name.
-USUAL = (
-    "end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque", "contact", "wall_tension",
-    "von_mises", "capacity_used", "code_used",
-)  # fmt: skip
+USUAL: tuple[str, ...] = ("end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque")
+USUAL += ("contact", "wall_tension", "von_mises", "capacity_used", "code_used")
 # Histories of one value that every result may have, and no scene asks for.
 NOT_ASKED_FOR = ("t", "contact_force", "grounded_length")
 # Components of a vector.
@@ -252,9 +250,16 @@ def slopes(s: Floats, x: Floats) -> Floats:
 
 
 def extreme_of(
-    result: StoredResult, name: str, unit: str, t: Floats, x: Floats, duration: float = extremes.THREE_HOURS, *,
-    threshold: float | None = None, smallest: bool = False, probability: float = extremes.FRACTILE,
-) -> extremes.Extreme:  # fmt: skip
+    result: StoredResult,
+    name: str,
+    unit: str,
+    t: Floats,
+    x: Floats,
+    duration: float = extremes.THREE_HOURS,
+    threshold: float | None = None,
+    smallest: bool = False,
+    probability: float = extremes.FRACTILE,
+) -> extremes.Extreme:
     """The largest (or smallest) value that a time of `duration` (s) brings of a history x (nt,) at times t (nt,) s.
 
     threshold: in the unit of x.  ResultError where there are too few peaks, where the history is round-off, where the
@@ -313,8 +318,6 @@ def _negated(found: extremes.Extreme) -> extremes.Extreme:
     def turned(interval: tuple[float, float]) -> tuple[float, float]:
         return -interval[1], -interval[0]
 
-    return found._replace(
-        most_probable=-found.most_probable, median=-found.median, fractile=-found.fractile,
-        most_probable_interval=turned(found.most_probable_interval), median_interval=turned(found.median_interval),
-        fractile_interval=turned(found.fractile_interval), fitted=f"of the negative values: {found.fitted}",
-    )  # fmt: skip
+    changed: dict[str, Any] = {x: -getattr(found, x) for x in ("most_probable", "median", "fractile")}
+    changed |= {f"{x}_interval": turned(getattr(found, f"{x}_interval")) for x in changed}
+    return found._replace(**changed, fitted=f"of the negative values: {found.fitted}")

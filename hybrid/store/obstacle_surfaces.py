@@ -133,8 +133,8 @@ def _box(body: Body) -> np.ndarray:
     turn = (np.arange(AROUND) + 0.5) * 2.0 * np.pi / AROUND  # no direction lies in a face: it has a corner
     rise = np.linspace(0.5 * np.pi, 0.0, OVER)
     rise = np.concatenate([-rise, rise[::-1]])
-    n = np.stack([np.outer(np.sin(rise), np.ones(AROUND)), np.outer(np.cos(rise), np.cos(turn)),
-                  np.outer(np.cos(rise), np.sin(turn))], axis=-1)  # fmt: skip
+    up, out = np.outer(np.sin(rise), np.ones(AROUND)), np.cos(rise)
+    n = np.stack([up, np.outer(out, np.cos(turn)), np.outer(out, np.sin(turn))], axis=-1)
     sides = np.concatenate([-np.ones(OVER), np.ones(OVER)])[:, None]
     signs = np.stack(np.broadcast_arrays(sides, np.sign(np.cos(turn)), np.sign(np.sin(turn))), axis=-1)
     local = body.radius * n + signs * np.array([body.half, *body.more[:2]])

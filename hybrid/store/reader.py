@@ -370,10 +370,16 @@ class Result(StoredResult):
         return found
 
     def extreme(
-        self, name: str, *, at: float | None = None, duration: float = extremes.THREE_HOURS,
-        threshold: float | None = None, times: Window | None = None, smallest: bool = False,
+        self,
+        name: str,
+        *,
+        at: float | None = None,
+        duration: float = extremes.THREE_HOURS,
+        threshold: float | None = None,
+        times: Window | None = None,
+        smallest: bool = False,
         probability: float = extremes.FRACTILE,
-    ) -> extremes.Extreme:  # fmt: skip
+    ) -> extremes.Extreme:
         """The largest (or smallest) value that a time of `duration` (s) brings, by peaks over a threshold of a history.
 
         at: arc length (m), of a quantity along the line; threshold: in the unit of the quantity, None: nine tenths of
@@ -381,15 +387,18 @@ class Result(StoredResult):
         what an angle can be.
         """
         history = one_history(history_of(self, name, times, at))
-        return extreme_of(
-            self, name, history.unit, history.t, history.values, duration,
-            threshold=threshold, smallest=smallest, probability=probability,
-        )  # fmt: skip
+        record, how = (name, history.unit, history.t, history.values), (threshold, smallest, probability)
+        return extreme_of(self, *record, duration, *how)
 
     def exceedance(
-        self, name: str, above: float | None = None, *, below: float | None = None, at: Any = None,
+        self,
+        name: str,
+        above: float | None = None,
+        *,
+        below: float | None = None,
+        at: Any = None,
         times: Window | None = None,
-    ) -> Floats:  # fmt: skip
+    ) -> Floats:
         """Part of the time for which a history is above a value, or below one.
 
         above, below: one of them, in the unit of the quantity; at, times: as of `statistics`.  The answer has the shape
@@ -445,10 +454,15 @@ class Result(StoredResult):
         return moments.welch(history.t, history.values, segment)
 
     def damage(
-        self, curve: str | Mapping[str, Any] | fatigue.Curve, *, strength: float | None = None,
-        section: Section | Sequence[float] | None = None, concentration: float = 1.0, times: Window | None = None,
+        self,
+        curve: str | Mapping[str, Any] | fatigue.Curve,
+        *,
+        strength: float | None = None,
+        section: Section | Sequence[float] | None = None,
+        concentration: float = 1.0,
+        times: Window | None = None,
         at: Any = None,
-    ) -> tuple[Floats, Floats]:  # fmt: skip
+    ) -> tuple[Floats, Floats]:
         """Arc lengths (n,) m and the damage (n,) that the outputs of the run do there, by a curve of fatigue.
 
         curve: a name of hybrid/statistics/fatigue_curves.csv, or kind, log_a, m (log_a2, m2, knee) of one's own.

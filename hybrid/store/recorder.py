@@ -21,6 +21,7 @@ from hybrid.store.format import (
     ArrayDataset,
     Field,
     Header,
+    ZoneRows,
     attributes_of_format,
     check_names,
     cut,
@@ -148,14 +149,13 @@ class Rows:
 
     # --- what it is given -----------------------------------------------------------------------------
 
-    def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
+    def save(self, t: float, values: Mapping[str, Any], zones: ZoneRows) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
         self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
 
     def save_batch(
-        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
-        later: Sequence[Sequence[tuple[str, float, float]]] = (),
-    ) -> None:  # fmt: skip
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: ZoneRows, later: Sequence[ZoneRows] = ()
+    ) -> None:
         """Append outputs of the fields (nb, ...) at the times (nb,), s.
 
         zones: of all of these outputs, or of the first; later: of each of the others, where they differ.

@@ -66,6 +66,9 @@ from hybrid.store.records import (
 SAME_TIME = 1e-9
 
 
+Source = str | Path | io.BytesIO | MemoryTarget
+
+
 class Columns(Mapping[str, np.ndarray]):
     """The datasets of one group, by name: ``result.energy["kinetic"]`` or ``result.energy.kinetic``."""
 
@@ -100,10 +103,7 @@ class Columns(Mapping[str, np.ndarray]):
 class StoredResult:
     """What is stored of one run, and nothing that follows from it: arrays, zones, events, lines, status."""
 
-    def __init__(
-        self, source: str | Path | io.BytesIO | MemoryTarget, summed: bool = True, line: str = "",
-        contents: Contents | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, source: Source, summed: bool = True, line: str = "", contents: Contents | None = None) -> None:
         """summed: as of `open_file`; line: name of a line of a result of several lines, of which alone it is then.
 
         contents: of the file, where they are in memory already.

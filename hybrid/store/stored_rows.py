@@ -17,6 +17,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.envelope import Recorded
+from hybrid.store.format import ZoneRows
 from hybrid.store.hdf5_file import unwritable
 from hybrid.store.integrity import DIGEST, Tree, matched
 
@@ -40,14 +41,13 @@ class ComparisonRecorder:
         """Time of the last output, s."""
         return self.times[-1] if self.times else -np.inf
 
-    def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
+    def save(self, t: float, values: Mapping[str, Any], zones: ZoneRows) -> None:
         """Append an output at time t, s.  ResultError when it is not finite."""
         self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
 
     def save_batch(
-        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
-        later: Sequence[Sequence[tuple[str, float, float]]] = (),
-    ) -> None:  # fmt: skip
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: ZoneRows, later: Sequence[ZoneRows] = ()
+    ) -> None:
         """Append outputs at the times (nb,), s, of the fields (nb, ...).  ResultError when one is not finite.
 
         later: as of `Recorder.save_batch`; not kept.

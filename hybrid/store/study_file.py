@@ -63,6 +63,11 @@ OWN: dict[str, tuple[str, str, Any, Any]] = {
 }
 
 
+def _described(column: Column, dims: list[str]) -> dict[str, Any]:
+    """Dimensions, unit and description of an array."""
+    return {"dimension_names": dims, "attributes": {"units": column.unit, "long_name": column.description}}
+
+
 class Column(NamedTuple):
     """An array of a study: unit, description, the names of its dimensions beside `case`, and its values."""
 
@@ -126,10 +131,8 @@ class StudyFile:
                 array = cls._array(group, name, column, cases, cases, str if column.values.dtype.kind in "UO" else None)
                 array[:] = column.values.astype(object) if column.values.dtype.kind in "UO" else column.values
             for name, (unit, text, kind, empty) in OWN.items():
-                group.create_array(
-                    name, shape=(cases,), chunks=(batch,), dtype=kind, fill_value=empty, dimension_names=["case"],
-                    attributes={"units": unit, "long_name": text},
-                )  # fmt: skip
+                what = {"dimension_names": ["case"], "attributes": {"units": unit, "long_name": text}}
+                group.create_array(name, shape=(cases,), chunks=(batch,), dtype=kind, fill_value=empty, **what)
             group.attrs.update(made | dict(attributes) | {"batch": batch, "format": FORMAT})
             draft.rename(path)
         except OSError as error:
@@ -141,11 +144,9 @@ class StudyFile:
     @staticmethod
     def _array(group: Any, name: str, column: Column, cases: int, batch: int, kind: Any = None) -> Any:
         inside = () if column.values.ndim == 1 else column.values.shape[1:]
-        return group.create_array(
-            name, shape=(cases, *inside), chunks=(batch, *inside), dtype=kind or column.values.dtype,
-            fill_value=np.nan if column.values.dtype.kind == "f" else None, dimension_names=["case", *column.dims],
-            attributes={"units": column.unit, "long_name": column.description},
-        )  # fmt: skip
+        how = {"shape": (cases, *inside), "chunks": (batch, *inside), "dtype": kind or column.values.dtype}
+        how |= {"fill_value": np.nan if column.values.dtype.kind == "f" else None}
+        return group.create_array(name, **how, **_described(column, ["case", *column.dims]))
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -184,10 +185,9 @@ class StudyFile:
 
     def _add(self, where: slice, columns: Mapping[str, Column], coordinates: Mapping[str, Column]) -> None:
         for name, column in coordinates.items():
-            array = self._arrays[name] = self._group.create_array(
-                name, shape=column.values.shape, chunks=column.values.shape, dtype=column.values.dtype, overwrite=True,
-                dimension_names=[name], attributes={"units": column.unit, "long_name": column.description},
-            )  # fmt: skip
+            shape = {"shape": column.values.shape, "chunks": column.values.shape, "dtype": column.values.dtype}
+            how = shape | _described(column, [name])
+            array = self._arrays[name] = self._group.create_array(name, overwrite=True, **how)
             array[:] = column.values
             array.attrs[COMPLETE] = 1
         for name, column in columns.items():

@@ -35,9 +35,14 @@ WORTH_A_NOTE = 0.01
 
 
 def rows_of(
-    result: Result, names: Sequence[str] | None = None, at: Sequence[float] | None = None, times: Window | None = None,
-    duration: float = THREE_HOURS, above: float | None = None, below: float | None = None,
-) -> list[dict[str, Any]]:  # fmt: skip
+    result: Result,
+    names: Sequence[str] | None = None,
+    at: Sequence[float] | None = None,
+    times: Window | None = None,
+    duration: float = THREE_HOURS,
+    above: float | None = None,
+    below: float | None = None,
+) -> list[dict[str, Any]]:
     """One row for each history: its summary, and the extreme of `duration` (s) or why there is none.
 
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
@@ -169,9 +174,9 @@ def part_off(result: Result, s: float, times: Any, section: Sequence[float] | No
     t = history_of(result, "tension", times).t
     there = (result.times >= t[0]) & (result.times <= t[-1])
     k, error, varies = int(np.abs(result.s - s).argmin()), 0.0, 0.0
-    by = {"tension": 1.0} if section is None else {
-        "tension": 1.0 / section[0], "curvature": 0.5 * section[2] * section[1],
-    }  # fmt: skip
+    by = {"tension": 1.0}
+    if section is not None:
+        by = {"tension": 1.0 / section[0], "curvature": 0.5 * section[2] * section[1]}
     for name, stress in by.items():
         if f"errors/total/{name}" not in result:
             return float("inf")
@@ -182,9 +187,13 @@ def part_off(result: Result, s: float, times: Any, section: Sequence[float] | No
 
 
 def life_within(
-    result: Result, facts: Mapping[str, Any], curve: Any, strength: float | None, section: Sequence[float] | None,
+    result: Result,
+    facts: Mapping[str, Any],
+    curve: Any,
+    strength: float | None,
+    section: Sequence[float] | None,
     times: Any,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Shortest and longest life, years, of all ranges larger or smaller by `part_off`; None: unlimited.
 
     facts: s (m), damage and life (years) there; the rest as of `Result.damage`.  Where ranges may be off by all that

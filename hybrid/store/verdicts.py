@@ -480,9 +480,14 @@ def _missed(result: StoredResult) -> bool:
 
 
 def _asked(
-    result: StoredResult, names: set[str], quantity: str, unit: str, asked: float | None, error: float | None,
+    result: StoredResult,
+    names: set[str],
+    quantity: str,
+    unit: str,
+    asked: float | None,
+    error: float | None,
     chance: bool = False,
-) -> Asked:  # fmt: skip
+) -> Asked:
     """The verdict on an accuracy; names: the quantities that it is of, none: not known, and every doubt counts.
 
     chance: whether the largest value of the quantity is by chance, so that its error misses nothing.

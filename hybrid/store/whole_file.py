@@ -552,9 +552,12 @@ def _links() -> h5p.PropLCID:
 
 
 def _fill(
-    file: h5py.File, group: str, part: ArrayContents, known: Mapping[str, h5d.DatasetID],
+    file: h5py.File,
+    group: str,
+    part: ArrayContents,
+    known: Mapping[str, h5d.DatasetID],
     without: Collection[tuple[str, str]],
-) -> None:  # fmt: skip
+) -> None:
     """Attributes, texts and values of a result; known: datasets that are open; without: those that are left out."""
     root = file[group] if group else file
     write_attributes(root, part.attributes)

@@ -283,12 +283,10 @@ def _figures_of(result: Result, row: Row) -> Row:
     """Status, cost and estimates of a result."""
     attributes, steps = result.attributes, max(len(line["steps/t"]) for _, line in result.each_line())
     missed = next((event.text for event in result.events if event.kind == "accuracy missed"), "")
-    return replace(
-        row, status=MISSED if missed else DONE, cause=missed, cells=attributes.get("cells"),
-        steps=steps, runs=attributes.get("effort_runs"), effort_cpu=attributes.get("effort_cpu"),
-        estimate_position=attributes.get("error_total_position"),
-        estimate_end_force=attributes.get("error_total_end_force"),
-    )  # fmt: skip
+    known = {"cells": "cells", "runs": "effort_runs", "effort_cpu": "effort_cpu"}
+    known |= {"estimate_position": "error_total_position", "estimate_end_force": "error_total_end_force"}
+    figures: dict[str, Any] = {key: attributes.get(name) for key, name in known.items()}
+    return replace(row, status=MISSED if missed else DONE, cause=missed, steps=steps, **figures)
 
 
 # Where something was measured: machine, date, versions, commit; as lines for the heading of a page.

@@ -81,9 +81,15 @@ class StudyRunning:
 
 
 def compute_open_batches(
-    file: StudyFile, cases: Cases, wanted: Mapping[str, Kept], workers: int | None, scheduler: str | None,
-    progress: Callable[[StudyRunning], None] | None, files: str = "", parts: Sequence[RunPart] = (),
-) -> None:  # fmt: skip
+    file: StudyFile,
+    cases: Cases,
+    wanted: Mapping[str, Kept],
+    workers: int | None,
+    scheduler: str | None,
+    progress: Callable[[StudyRunning], None] | None,
+    files: str = "",
+    parts: Sequence[RunPart] = (),
+) -> None:
     """Compute the batches of a study that are not done; files: folder for whole results, "": they are not kept.
 
     parts: of all runs, of the user's own.  ResultError when the scheduler is gone.
@@ -217,7 +223,8 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     import dask
 
     settings = {
-        "distributed.scheduler.allowed-failures": TRIES - 1, "distributed.comm.timeouts.connect": "20s",
+        "distributed.scheduler.allowed-failures": TRIES - 1,
+        "distributed.comm.timeouts.connect": "20s",
         # A killed worker starts again; on a busy machine that takes longer than the 15 s after which dask gives it up,
         # and the study would wait for ever for workers that are not there.
         "distributed.deploy.lost-worker-timeout": "1h",
@@ -228,10 +235,12 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 32 * 1024 * 1024,
         # While nothing happens scheduler and worker take 5 % of a core at dask's intervals, of 20 to 500 ms, here 1 %;
         # batches take seconds.
-        "distributed.admin.tick.interval": "1s", "distributed.admin.tick.limit": "1 minute",
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.tick.limit": "1 minute",
         "distributed.admin.system-monitor.gil.enabled": False,
-        "distributed.admin.system-monitor.interval": "2s", "distributed.worker.memory.monitor-interval": "500ms",
-    }  # fmt: skip
+        "distributed.admin.system-monitor.interval": "2s",
+        "distributed.worker.memory.monitor-interval": "500ms",
+    }
     with dask.config.set(settings), ExitStack() as stack:
         if scheduler is not None:
             if not re.search(r":\d+$|^inproc://", scheduler):
@@ -397,9 +406,12 @@ def case_of(path: str | Path, case: int, output: str | Path | None = None, *, pa
 
 
 def _asked(
-    source: Any, vary: Mapping[str, Any] | None, collect: Mapping[str, Any] | None, more: Mapping[str, Any],
+    source: Any,
+    vary: Mapping[str, Any] | None,
+    collect: Mapping[str, Any] | None,
+    more: Mapping[str, Any],
     output: str | Path | None,
-) -> tuple[Study, Path]:  # fmt: skip
+) -> tuple[Study, Path]:
     """The study that is meant, and where its results go."""
     given: dict[str, Any] = {"vary": vary, "collect": collect, **more}
     parts = {name: value for name, value in given.items() if value is not None}
@@ -506,13 +518,12 @@ def _created(
         columns[name] = Column("", asked.derive[name], (), np.asarray(values_of))
     stored = {"base": cases.base, "keys": cases.keys, "rows": rows, "static": cases.static}
     stored |= {"parts": [x.name for x in parts]} if parts else {}
-    attributes = {
-        "identity": identity, "title": asked.title or Path(asked.scene).stem, "study": json.dumps(stored),
-        "variables": json.dumps(list(columns)), "scene_file": Path(asked.scene).name,
-        "files": json.dumps(cases.files), "sample": json.dumps(asked.sample.model_dump() if asked.sample else None),
-        "bounds": json.dumps(cases.bounds),
-        "collect": json.dumps({name: each.model_dump(mode="json") for name, each in wanted.items()}),
-    }  # fmt: skip
+    texts: dict[str, Any] = {"study": stored, "variables": list(columns), "files": cases.files, "bounds": cases.bounds}
+    texts |= {"sample": asked.sample.model_dump() if asked.sample else None}
+    texts |= {"collect": {name: each.model_dump(mode="json") for name, each in wanted.items()}}
+    attributes = {name: json.dumps(x) for name, x in texts.items()}
+    attributes |= {"identity": identity, "title": asked.title or Path(asked.scene).stem}
+    attributes["scene_file"] = Path(asked.scene).name
     return StudyFile.create(target, columns, len(rows), batch, attributes)
 
 

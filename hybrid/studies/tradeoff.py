@@ -107,10 +107,9 @@ def trade(
                 limits.append(_bounds(want, largest))
         finally:
             position, end_force = _bounds(wanted, largest)
-            table = TradeTable(
-                _title(tables), target, tables.length, largest, position, end_force, tuple(rows), tuple(notes),
-                (*store.facts, *_measured(store, repeat, command)), store.total - len(rows),
-            )  # fmt: skip
+            facts, asked = (*store.facts, *_measured(store, repeat, command)), (largest, position, end_force)
+            left, found = store.total - len(rows), (tuple(rows), tuple(notes), facts)
+            table = TradeTable(_title(tables), target, tables.length, *(*asked, *found), left)
             table = _written(judged(table, limits), kinds, store.folder)
     return table
 

@@ -42,18 +42,14 @@ AT_REST: dict[str, tuple[str, tuple[str, ...]]] = {
     "curvature": ("curvature", ("max",)),
 }
 # Of a summary, and its unit; none: that of the quantity.
-OF_SUMMARY = {
-    "mean": ("mean", None), "deviation": ("standard_deviation", None), "skewness": ("skewness", ""),
-    "period": ("crossing_period", "s"), "significant": ("significant_range", None),
-}  # fmt: skip
-WORDS = {
-    "max": "largest", "min": "smallest", "mean": "mean of", "median": "median of", "deviation": "standard deviation of",
-    "skewness": "skewness of", "period": "period between up-crossings of the mean of",
-    "significant": "significant range of", "extreme": "most probable maximum (MPM) of",
-    "fractile": "P90 of the maximum of", "damage": "fatigue damage", "history": "history",
-    "exceedance": "part of the time", "utilisation": "largest part that is used of",
-    "profile": "largest at each place",
-}  # fmt: skip
+OF_SUMMARY: dict[str, tuple[str, str | None]] = {"mean": ("mean", None), "deviation": ("standard_deviation", None)}
+OF_SUMMARY |= {"skewness": ("skewness", ""), "period": ("crossing_period", "s")}
+OF_SUMMARY |= {"significant": ("significant_range", None)}
+WORDS = {"max": "largest", "min": "smallest", "mean": "mean of", "median": "median of", "skewness": "skewness of"}
+WORDS |= {"deviation": "standard deviation of", "period": "period between up-crossings of the mean of"}
+WORDS |= {"significant": "significant range of", "extreme": "most probable maximum (MPM) of", "history": "history"}
+WORDS |= {"fractile": "P90 of the maximum of", "damage": "fatigue damage", "exceedance": "part of the time"}
+WORDS |= {"utilisation": "largest part that is used of", "profile": "largest at each place"}
 
 
 class Variable(NamedTuple):
@@ -358,9 +354,13 @@ def write_outcomes(file: StudyFile, batch: int, outcomes: list[Outcome]) -> None
 
 
 def _fits(
-    file: StudyFile, shapes: dict[str, tuple[int, ...]], coordinates: dict[str, Column], name: str, variable: Variable,
+    file: StudyFile,
+    shapes: dict[str, tuple[int, ...]],
+    coordinates: dict[str, Column],
+    name: str,
+    variable: Variable,
     values: np.ndarray,
-) -> bool:  # fmt: skip
+) -> bool:
     """Whether an array has the shape, times and places of the study; those of the first one become the study's."""
     new = {}
     for dim, (unit, along) in variable.coordinates.items():

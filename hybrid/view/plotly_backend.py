@@ -21,10 +21,8 @@ from hybrid.view.figure import GREY, INK, SMALL, Area, Axis, Band, Box, Item, Li
 
 Spec = dict[str, Any]
 # Of matplotlib's names of marks, plotly's. Screens are coarser than paper: marks and lines are larger there.
-_SYMBOLS = {
-    "o": "circle", "s": "square", "^": "triangle-up", "v": "triangle-down", "D": "diamond", "+": "cross", "x": "x",
-    "X": "x",
-}  # fmt: skip
+_SYMBOLS = {"o": "circle", "s": "square", "^": "triangle-up", "v": "triangle-down", "D": "diamond"}
+_SYMBOLS |= {"+": "cross", "x": "x", "X": "x"}
 _LARGER, _WIDER = 2.7, 1.25
 _FONT = "system-ui, sans-serif"
 
@@ -58,11 +56,10 @@ def colour_scale(colours: Sequence[str]) -> list[list[Any]]:
 def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) -> Spec:
     def axis(of: Axis, limits: tuple[float, float]) -> Spec:
         named = {"tickvals": list(of.ticks), "ticktext": [escape(x) for x in of.names]} if of.names else {}
-        return named | {
-            "title": {"text": escape(of.label), "standoff": 6}, "range": list(limits), "showgrid": panel.grid,
-            "zeroline": False, "gridcolor": "#EDEDED", "linecolor": "#BDBDBD", "ticks": "outside", "ticklen": 4,
-            "tickcolor": "#BDBDBD", "automargin": True, "exponentformat": "SI",
-        }  # fmt: skip
+        named |= {"title": {"text": escape(of.label), "standoff": 6}, "range": list(limits), "showgrid": panel.grid}
+        ticks = {"ticks": "outside", "ticklen": 4, "tickcolor": "#BDBDBD", "exponentformat": "SI"}
+        lines = {"zeroline": False, "gridcolor": "#EDEDED", "linecolor": "#BDBDBD", "automargin": True}
+        return named | ticks | lines
 
     up_axis = axis(panel.y, up)
     if panel.aspect:
@@ -84,11 +81,10 @@ def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) 
 
 def _annotation(item: Text) -> Spec:
     across, up = ("x domain" if "x" in item.parts else "x"), ("y domain" if "y" in item.parts else "y")
-    return {
-        "text": escape(item.text), "x": item.x, "y": item.y, "xref": across, "yref": up, "showarrow": False,
-        "xanchor": item.across, "yanchor": "bottom" if item.up == "baseline" else item.up,
-        "xshift": item.offset[0], "yshift": item.offset[1], "font": {"color": item.colour, "size": _WIDER * item.size},
-    }  # fmt: skip
+    place = {"x": item.x, "y": item.y, "xref": across, "yref": up, "xshift": item.offset[0], "yshift": item.offset[1]}
+    anchors = {"xanchor": item.across, "yanchor": "bottom" if item.up == "baseline" else item.up}
+    font = {"color": item.colour, "size": _WIDER * item.size}
+    return {"text": escape(item.text), "showarrow": False, "font": font} | place | anchors
 
 
 def _traces(item: Item, store: Store, unit: str | None) -> list[Spec]:

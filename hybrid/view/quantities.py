@@ -52,9 +52,15 @@ if TYPE_CHECKING:
 
 
 def plot_quantity(
-    result: Result, quantity: str = "tension", *, at: Any = None, envelope: bool = False, spectrum: bool = False,
-    times: tuple[float | None, float | None] | None = None, ax: Axes | None = None,
-) -> Axes:  # fmt: skip
+    result: Result,
+    quantity: str = "tension",
+    *,
+    at: Any = None,
+    envelope: bool = False,
+    spectrum: bool = False,
+    times: tuple[float | None, float | None] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
     """Draw one quantity, and return the axes.
 
     quantity: a name of `result.names`, of a group with its slash, such as "work/drag"; end forces are those of every

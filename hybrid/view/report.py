@@ -143,22 +143,18 @@ def _moment(scene: dict[str, Any], way: dict[str, Any] | None, k: int) -> list[d
             line |= {"cmin": np.log10(way["low"]), "cmax": np.log10(way["high"])}
         elif "unit" in way:
             line |= {"showscale": True, "colorbar": {"title": {"text": way["label"]}, "len": 0.7, "thickness": 12}}
-    curve = {
-        "type": "scatter3d", "mode": "lines", "name": "cable", "line": line, "showlegend": False,
-        "x": scene["x"][k], "y": scene["y"][k], "z": scene["z"][k], "customdata": scene["s"],
-        "hovertemplate": hover + "<extra></extra>",
-    }  # fmt: skip
+    curve = {"type": "scatter3d", "mode": "lines", "name": "cable", "line": line, "showlegend": False}
+    curve |= {axis: scene[axis][k] for axis in "xyz"}
+    curve |= {"customdata": scene["s"], "hovertemplate": hover + "<extra></extra>"}
     if values is not None and "unit" in (way or {}):
         curve |= {"text": [f"{x:.4g}" for x in values]}
         curve["hovertemplate"] = f"{hover}<br>{(way or {})['key']} %{{text}} {(way or {})['unit']}<extra></extra>"
-    marks = [
-        {
-            "type": "scatter3d", "mode": "markers", "name": mark["name"], "showlegend": bool(mark["name"]),
-            "x": mark["x"][k], "y": mark["y"][k], "z": mark["z"][k], "hoverinfo": "name",
-            "marker": {"symbol": mark["symbol"], "color": mark["colour"], "size": mark["size"]},
-        }
-        for mark in scene["marks"]
-    ]  # fmt: skip
+    marks = []
+    for mark in scene["marks"]:
+        drawn = {"symbol": mark["symbol"], "color": mark["colour"], "size": mark["size"]}
+        named = {"name": mark["name"], "showlegend": bool(mark["name"]), "hoverinfo": "name"}
+        places = {axis: mark[axis][k] for axis in "xyz"}
+        marks.append({"type": "scatter3d", "mode": "markers", "marker": drawn} | named | places)
     return [curve, *marks]
 
 
@@ -174,19 +170,15 @@ def _layout(result: Result, scene: dict[str, Any]) -> dict[str, Any]:
     wide, deep = (high - low for low, high in box[:2])
     largest = max(high - low for low, high in box)
     eye = {"x": 0.5, "y": -1.9, "z": 0.5} if wide >= deep else {"x": 1.9, "y": 0.5, "z": 0.5}
-    axes = {
-        f"{axis}axis": {
-            "title": {"text": f"{axis} (m)"}, "range": [low, high], "backgroundcolor": "#FFFFFF", "gridcolor": _GRID,
-            "zeroline": False, "nticks": 6 if high - low > 0.3 * largest else 2,
-        }
-        for axis, (low, high) in zip("xyz", box, strict=True)
-    }  # fmt: skip
-    return {
-        "height": HEIGHT, "margin": {"l": 0, "r": 0, "t": 36, "b": 0}, "paper_bgcolor": "#FFFFFF",
-        "title": {"text": title, "font": {"size": 15}, "x": 0.01, "xanchor": "left"},
-        "font": {"color": scene["ink"]}, "legend": {"x": 0.99, "xanchor": "right", "y": 0.99, "yanchor": "top"},
-        "scene": {"aspectmode": "data", "camera": {"eye": eye}} | axes,
-    }  # fmt: skip
+    axes = {}
+    for axis, (low, high) in zip("xyz", box, strict=True):
+        ticks = {"zeroline": False, "nticks": 6 if high - low > 0.3 * largest else 2}
+        drawn = {"title": {"text": f"{axis} (m)"}, "backgroundcolor": "#FFFFFF", "gridcolor": _GRID}
+        axes[f"{axis}axis"] = drawn | ticks | {"range": [low, high]}
+    page = {"height": HEIGHT, "margin": {"l": 0, "r": 0, "t": 36, "b": 0}, "paper_bgcolor": "#FFFFFF"}
+    page |= {"title": {"text": title, "font": {"size": 15}, "x": 0.01, "xanchor": "left"}}
+    page |= {"legend": {"x": 0.99, "xanchor": "right", "y": 0.99, "yanchor": "top"}, "font": {"color": scene["ink"]}}
+    return page | {"scene": {"aspectmode": "data", "camera": {"eye": eye}} | axes}
 
 
 def _controls(scene: dict[str, Any]) -> dict[str, Any]:
@@ -199,19 +191,15 @@ def _controls(scene: dict[str, Any]) -> dict[str, Any]:
         return {"mode": "immediate", "fromcurrent": True, "frame": frame, "transition": {"duration": 0}}
 
     steps = [{"method": "animate", "label": short(t, 4), "args": [[str(k)], shown(0.0)]} for k, t in enumerate(times)]
-    slider = {
-        "active": 0, "steps": steps, "x": 0.12, "len": 0.86, "y": 0.0, "pad": {"t": 8, "b": 8},
-        "currentvalue": {"prefix": "t = ", "suffix": " s", "xanchor": "left"}, "transition": {"duration": 0},
-        "font": {"size": 11}, "ticklen": 3,
-    }  # fmt: skip
+    slider = {"active": 0, "steps": steps, "x": 0.12, "len": 0.86, "y": 0.0, "pad": {"t": 8, "b": 8}}
+    slider |= {"currentvalue": {"prefix": "t = ", "suffix": " s", "xanchor": "left"}, "transition": {"duration": 0}}
+    slider |= {"font": {"size": 11}, "ticklen": 3}
     buttons = [
         {"label": "Play", "method": "animate", "args": [None, shown(each)]},
         {"label": "Stop", "method": "animate", "args": [[None], shown(0.0)]},
     ]
-    menu = {
-        "type": "buttons", "direction": "left", "buttons": buttons, "showactive": False, "x": 0.0, "xanchor": "left",
-        "y": 0.0, "yanchor": "top", "pad": {"t": 28, "r": 8},
-    }  # fmt: skip
+    menu = {"type": "buttons", "direction": "left", "buttons": buttons, "showactive": False, "pad": {"t": 28, "r": 8}}
+    menu |= {"x": 0.0, "xanchor": "left", "y": 0.0, "yanchor": "top"}
     return {"sliders": [slider], "updatemenus": [menu]}
 
 

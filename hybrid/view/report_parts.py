@@ -50,11 +50,9 @@ from hybrid.view.zones import event_rows
 MOST_ROWS = 10
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
-_SETTINGS = {
-    "accuracy_asked": "accuracy asked", "cells": "cells", "length": "length (m)", "solver": "solver",
-    "static_path": "equilibrium found by", "static_residual": "equilibrium out of balance (N)",
-    "tension_scale": "tension scale (N)", "created": "created",
-}  # fmt: skip
+_SETTINGS = {"accuracy_asked": "accuracy asked", "cells": "cells", "length": "length (m)", "solver": "solver"}
+_SETTINGS |= {"static_path": "equilibrium found by", "static_residual": "equilibrium out of balance (N)"}
+_SETTINGS |= {"tension_scale": "tension scale (N)", "created": "created"}
 
 
 def filled_page(parts: dict[str, str], store: Store) -> str:
@@ -460,11 +458,9 @@ def write_modes(found: Any, path: str | Path) -> Path:
 def html(found: Any) -> str:
     """The page as text."""
     title = f"Natural modes of {found.title or 'a line'}"
-    parts = {
-        "title": escape(title), "subtitle": escape(f"{len(found.modes)} modes on {found.cells} cells"),
-        "footer": escape(footer()), "mark": REPORT_MARK, "css": page_file("report.css"), "js": "", "data": "",
-        "plotly": "", "section": section(found),
-    }  # fmt: skip
+    parts = {"title": escape(title), "subtitle": escape(f"{len(found.modes)} modes on {found.cells} cells")}
+    parts |= {"footer": escape(footer()), "mark": REPORT_MARK, "css": page_file("report.css")}
+    parts |= {"section": section(found)} | dict.fromkeys(("js", "data", "plotly"), "")
     return page_of("modes.html", parts)
 
 

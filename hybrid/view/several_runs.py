@@ -77,11 +77,10 @@ if TYPE_CHECKING:
 Curve = tuple[np.ndarray, np.ndarray]
 OF_RUNS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # Extremes in the table: quantity, whether the lowest, heading.
-EXTREMES = (
-    ("tension", False, "largest tension"), ("tension", True, "lowest tension"),
-    ("curvature", False, "largest curvature"), ("bending_moment", False, "largest bending moment"),
-    ("torque", False, "largest torque"), ("contact", False, "largest contact force"),
-)  # fmt: skip
+_LARGEST = "tension", "curvature", "bending_moment", "torque"
+EXTREMES = [(x, False, f"largest {x.replace('_', ' ')}") for x in _LARGEST]
+EXTREMES[1:1] = [("tension", True, "lowest tension")]
+EXTREMES += [("contact", False, "largest contact force")]
 
 
 def write_comparison(
@@ -122,15 +121,14 @@ def _html(results: Mapping[str, Result]) -> str:
             text += f'<section id="{key}"><h2>{title}</h2><p class="quiet">{note}</p>'
             text += f'<div class="grid">{drawn}</div></section>'
     first = next(iter(results))
-    page = {
+    page = dict.fromkeys(("statistics", "cable", "events", "energy"), "") | {
         "title": escape(f"{', '.join(results)}: compared"),
         "subtitle": escape("; ".join(f"{name}: {r.title or '(no title)'}" for name, r in results.items())),
         "verdict": f'<section id="verdict" aria-label="Verdict">{_verdict(results)}</section>',
-        "facts": _table(results), "statistics": "", "cable": "", "figures": text, "events": "", "energy": "",
-        "settings": _scenes(results), "scene_title": escape(f"Scene of {first} (YAML)"),
-        "scene": escape(results[first].scene_text), "footer": escape(parts.footer()), "mark": REPORT_MARK,
-        "index": script_json({"scene": None, "figures": figures}),
-    }  # fmt: skip
+    }
+    page |= {"facts": _table(results), "figures": text, "settings": _scenes(results), "mark": REPORT_MARK}
+    page |= {"scene_title": escape(f"Scene of {first} (YAML)"), "scene": escape(results[first].scene_text)}
+    page |= {"footer": escape(parts.footer()), "index": script_json({"scene": None, "figures": figures})}
     return parts.filled_page(page, store)
 
 

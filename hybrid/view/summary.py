@@ -394,10 +394,9 @@ def _hockling(result: Result) -> Fact:
         return Fact("hockling", title, f"{text} {HOCKLING}.", "note" if pressed or loops else "plain", values)
     i, k = _output_and_point(ratio, int(ratio.argmax()))
     t, s = float(result.times[i]), float(found.s[k])
-    values = {
-        "torque": float(torque[i, k]), "needed": float(needed[i, k]),
-        "tension": float(tension.values[i, k]), "ratio": float(ratio[i, k]), "margin": 1.0 / float(ratio[i, k]),
-    }  # fmt: skip
+    fields = {"torque": torque, "needed": needed, "tension": tension.values, "ratio": ratio}
+    values = {name: float(x[i, k]) for name, x in fields.items()}
+    values["margin"] = 1.0 / values["ratio"]
     doubt = doubt_of(result, "torque", "tension") if values["ratio"] < 1.0 else None
     there = f"{place(result, s)}{moment(result, t)}"
     text = (

@@ -70,10 +70,9 @@ _SAME = 1e-12  # of the length: places so close are one, as they are to the reco
 
 
 # Criteria by which a stretch is rod, in words.
-WHY = {
-    "bend": "bending", "slack": "low tension", "clamp": "a clamp or moment at an end", "point": "a point load or joint",
-    "edge": "the touchdown", "torsion": "torsion", "given": "asked for by the scene", "contact": "contact with itself",
-}  # fmt: skip
+WHY = {"bend": "bending", "slack": "low tension", "clamp": "a clamp or moment at an end", "edge": "the touchdown"}
+WHY |= {"point": "a point load or joint", "torsion": "torsion", "given": "asked for by the scene"}
+WHY |= {"contact": "contact with itself"}
 
 
 class Rod(NamedTuple):

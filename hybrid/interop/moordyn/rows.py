@@ -27,10 +27,7 @@ TITLES: dict[str, tuple[str, ...]] = {
     "rod types": ("ROD TYPES", "ROD DICTIONARY"),
     "bodies": ("BODIES", "BODY LIST", "BODY PROPERTIES"),
     "rods": ("RODS", "ROD LIST", "ROD PROPERTIES"),
-    "points": (
-        "POINTS", "POINT LIST", "POINT PROPERTIES", "CONNECTIONS", "CONNECTION LIST", "CONNECTION PROPERTIES",
-        "NODES", "NODE LIST", "NODE PROPERTIES",
-    ),
+    "points": tuple(f"{x}{y}" for x in ("POINT", "CONNECTION", "NODE") for y in ("S", " LIST", " PROPERTIES")),
     "lines": ("LINES", "LINE LIST", "LINE PROPERTIES"),
     "syrope": ("SYROPE IC",),
     "failure": ("FAILURE", "FAILURES"),
@@ -38,7 +35,7 @@ TITLES: dict[str, tuple[str, ...]] = {
     "external loads": ("EXTERNAL LOADS",),
     "options": ("OPTIONS", "SOLVER OPTIONS"),
     "outputs": ("OUTPUTS", "OUTPUT"),
-}  # fmt: skip
+}
 _SECTIONS = {title: name for name, titles in TITLES.items() for title in titles}
 # A title, with or without a remark beside it; the longest that fits: LINE TYPES are no LINES.
 _TITLE = re.compile(rf"\b({'|'.join(sorted(_SECTIONS, key=len, reverse=True))})\b")

@@ -360,10 +360,8 @@ class _Writer:
             (section.added_mass.normal, section.added_mass.tangential) if section.added_mass is not None else (0.0, 0.0)
         )
         ba = damping.stiffness * section.axial_stiffness if damping is not None else 0.0
-        values = (
-            section.diameter or NO_DIAMETER, section.mass, section.axial_stiffness, ba, section.weakest_bending or 0.0,
-            drag[0], added[0], drag[1], added[1],
-        )  # fmt: skip
+        sizes = section.diameter or NO_DIAMETER, section.mass, section.axial_stiffness, ba
+        values = (*sizes, section.weakest_bending or 0.0, drag[0], added[0], drag[1], added[1])
         return self.types.setdefault(values, f"type{len(self.types) + 1}")
 
     def _step(self, section: Section, l: float) -> None:
