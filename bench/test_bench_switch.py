@@ -19,8 +19,8 @@ from test_bench_zones import MESHES, SHARE, Text, per_step, riser, run, touchdow
 import hybrid
 from hybrid.errors import ZONE_EVENTS
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.run import Run
+from hybrid.simulation.run_line import RunLine
 from hybrid.simulation.run_zones import RunZones
 from hybrid.zones import change as zone_changes
 from hybrid.zones.manager import DomainManager
@@ -108,7 +108,7 @@ def test_switch_of_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     hybrid.run(four_lines())  # the first compiles
     monkeypatch.setattr(RunZones, "after_step", without_outputs)
     monkeypatch.setattr(Run, "_attach", timed(Run._attach, attaching, process_time))
-    monkeypatch.setattr(LineResult, "write_down", timed(LineResult.write_down, written, process_time))
+    monkeypatch.setattr(RunLine, "write_down", timed(RunLine.write_down, written, process_time))
     for _ in range(ROUNDS):
         result = hybrid.run(four_lines())
         for line in result.lines.values():

@@ -9,8 +9,8 @@ from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import State, Work
 from hybrid.model.build import Model
-from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.payout import PayingOut
+from hybrid.simulation.run_line import RunLine
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.contact import SelfContact
 
@@ -28,7 +28,7 @@ class OnlyLine:
         self.run = simulation._run
 
     @property
-    def line(self) -> LineResult:
+    def line(self) -> RunLine:
         """What is recorded of it."""
         (line,) = self.run.lines
         return line

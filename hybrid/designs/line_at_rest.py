@@ -24,7 +24,7 @@ from hybrid.model.ends import rotation
 from hybrid.model.sections import jump_points, output_points
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.line_result import observer_of
+from hybrid.simulation.run_line import observer_of
 from hybrid.solve.stepper import POWERS
 
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.

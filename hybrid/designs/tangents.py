@@ -73,8 +73,8 @@ from hybrid.model.resolution import Resolution
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.equilibrium import joined_lines
-from hybrid.simulation.line_result import observer_of
 from hybrid.simulation.run import Run
+from hybrid.simulation.run_line import observer_of
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import batch_of_rows
 from hybrid.solve.stepper import HEAVY, POWERS, JoinedLine, NetworkState

@@ -38,12 +38,12 @@ from hybrid.scene.network import Network
 from hybrid.scene.read import scene_text
 from hybrid.scene.root import Scene
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.mesh_survey import Survey, rods_at_rest, survey_duration, survey_points
 from hybrid.simulation.own_parts import RunPart
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter, at_once
 from hybrid.simulation.restart import LoadChange, changes_text, is_cut_off, kept_resolution, with_own_contact
 from hybrid.simulation.run import Run, new_run, start_of
+from hybrid.simulation.run_line import FORCE_COLUMNS, RunLine
 from hybrid.simulation.run_of_lines import AnyRecorder, Heard
 from hybrid.simulation.run_record import Asked, Recording
 from hybrid.simulation.run_sample import (
@@ -289,7 +289,7 @@ class Case:
         return samples
 
     def _sample_of(
-        self, line: LineResult, run: Run, data_of: Callable[[str], Any], result: Result, cpu: float, stay: Path | None
+        self, line: RunLine, run: Run, data_of: Callable[[str], Any], result: Result, cpu: float, stay: Path | None
     ) -> RunSample:
         """What is compared of a line in a complete result.
 
@@ -395,7 +395,7 @@ class Case:
         cpu = clock.thread_time() - begin
         return {x.name: self._compared_line(x, run, cpu, judged=points is None) for x in run.lines}
 
-    def _compared_line(self, line: LineResult, run: Run, cpu: float, judged: bool) -> RunSample:
+    def _compared_line(self, line: RunLine, run: Run, cpu: float, judged: bool) -> RunSample:
         """What is compared of a line in a run for comparison; judged: extremes, too."""
         name, resolution, found = line.name, run.resolution.lines[line.name], line.recorder
         assert isinstance(found, ComparisonRecorder)
@@ -535,11 +535,11 @@ class CaseAtRest(Case):
             return super()._compared(run, target, cpu, late)
         return {line.name: _sample(line, run, cpu) for line in run.lines}
 
-    def _compared_line(self, line: LineResult, run: Run, cpu: float, judged: bool) -> RunSample:
+    def _compared_line(self, line: RunLine, run: Run, cpu: float, judged: bool) -> RunSample:
         return _sample(line, run, cpu)
 
 
-def _sample(line: LineResult, run: Run, cpu: float) -> RunSample:
+def _sample(line: RunLine, run: Run, cpu: float) -> RunSample:
     """What is compared of a line in an equilibrium that has been recorded; cpu: s, that it took."""
     k, model = line.number, line.model
     batch = line.state_now(0.0, run.solver.lines[k].ends, run.state.lines[k], run.solver.work[k])

@@ -23,8 +23,8 @@ from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.kernels.step.accept import GROWN
 from hybrid.model.build import Model, in_space, leaves_plane, planar, untwist
 from hybrid.model.network import NetworkModel
-from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.parts import Part
+from hybrid.simulation.run_line import RunLine
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import on_nodes, scaled, seed
@@ -48,7 +48,7 @@ Note = Callable[[int, str, str], None]
 class LonePlane:
     """The plane of one line: whether its steps are in it, and the push out of it that they carry along."""
 
-    def __init__(self, number: int, line: LineResult, counts: b.Counts, insists: bool) -> None:
+    def __init__(self, number: int, line: RunLine, counts: b.Counts, insists: bool) -> None:
         """counts: of the run, whose parity says which of two pushes is that of now; insists: as of `LonePlanes`."""
         self.insists = insists
         self.plane: Floats | None = None  # (3, 3) in which its steps are computed; None: in space

@@ -65,7 +65,7 @@ OF_NODES, OF_CELLS = ("r", "v", "vd", "kb"), ("e", "T", "a1", "w", "h")
 
 
 class OfLine(Protocol):
-    """What changes of cells have to know of the result of a line (simulation.line_result)."""
+    """What changes of cells have to know of the result of a line (simulation.run_line)."""
 
     books: Books
 

@@ -24,13 +24,13 @@ from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import write_snapshot
 from hybrid.simulation.floating_watch import FloatingWatch
-from hybrid.simulation.line_result import LineResult, Wanted
 from hybrid.simulation.lone_planes import LonePlanes
 from hybrid.simulation.own_parts import OwnParts
 from hybrid.simulation.parts import EVERY_STEP, Part, Parts
 from hybrid.simulation.progress import at_once
 from hybrid.simulation.restart import LoadChange, kept_resolution, other_program, refused, require_same
 from hybrid.simulation.run_contact import RunContact, refuse_within_itself
+from hybrid.simulation.run_line import RunLine, Wanted
 from hybrid.simulation.run_of_lines import LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
 from hybrid.simulation.run_record import ALONE, RecordedRun, Recording, RunFile, RunRecorder, kept_changes, restore
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
@@ -565,7 +565,7 @@ def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, 
         record = partial(run.file.line_rows, manager=manager) if run.target is not None else None
         wanted = Wanted(record, points.get(name))
         shown, outputs = run.file.scene_of(scene), len(run.times)
-        line = LineResult(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))
+        line = RunLine(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))
         run.lines.append(line)
         line.manager = manager
     if not first.resumed:

@@ -30,10 +30,10 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.diagnostics import LineStep
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_result import MOST_WAITING, LineResult
 from hybrid.simulation.parts import Part, Parts, Sampled
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
+from hybrid.simulation.run_line import MOST_WAITING, RunLine
 from hybrid.simulation.run_quantities import RunQuantities
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
@@ -72,7 +72,7 @@ class RunOfLines:
     other: NetworkState  # after the next step
     solver: NetworkSolver
     loop: NetworkSteps
-    lines: list[LineResult]
+    lines: list[RunLine]
     scenes: list[LineScene]
     resolution: NetworkResolution
     parts: Parts

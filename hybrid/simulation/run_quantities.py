@@ -32,9 +32,9 @@ from hybrid.scene.network import Network
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.line_result import LineResult, observer_of
 from hybrid.simulation.parts import Part, Sampled, times
 from hybrid.simulation.result_file import STEP_FIELDS, asked_limits
+from hybrid.simulation.run_line import RunLine, observer_of
 from hybrid.solve.contact import SharedContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.store.format import Field
@@ -73,7 +73,7 @@ class RunQuantities(Part):
                 found.pipes = found.capacities = None  # what goes along a line is in the result of the line
                 self._of_line[line] = found, found.probes()
 
-    def keep_ranges(self, lines: Sequence[LineResult]) -> None:
+    def keep_ranges(self, lines: Sequence[RunLine]) -> None:
         """From now on the books of the lines keep the ranges of what is asked of them, over all steps.
 
         Clearances of two lines stand with the later one, which is looked at when the other one has been.
@@ -162,7 +162,7 @@ class RunQuantities(Part):
         """Limits by name."""
         return asked_limits(self._wanted)
 
-    def values(self, states: Mapping[str, Batch], lines: Mapping[str, LineResult]) -> dict[str, Floats]:
+    def values(self, states: Mapping[str, Batch], lines: Mapping[str, RunLine]) -> dict[str, Floats]:
         """Values (nb,) of outputs, from the states of the lines and what is recorded of them, by name."""
         out: dict[str, Floats] = {}
         for name, (found, probes) in self._of_line.items():
@@ -181,7 +181,7 @@ class RunQuantities(Part):
         held[:, [k for line, k in self._idle if line == name]] = 0
         return states._replace(held=held)
 
-    def _radii(self, line: LineResult) -> Floats:
+    def _radii(self, line: RunLine) -> Floats:
         return Quantities(line.scene, {}).radii(line.model.line.s)
 
 

@@ -31,7 +31,6 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.root import ShortForm
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import Sink
-from hybrid.simulation.line_result import LineResult
 from hybrid.simulation.own_parts import RunPart
 from hybrid.simulation.parts import Part, Sampled
 from hybrid.simulation.restart import (
@@ -47,6 +46,7 @@ from hybrid.simulation.restart import (
     resolution_tree,
 )
 from hybrid.simulation.result_file import mesh_fields, note_neglected_bending, places_of_elevation, result_header
+from hybrid.simulation.run_line import RunLine
 from hybrid.simulation.run_of_lines import AnyRecorder, Heard, RunOfLines
 from hybrid.simulation.run_quantities import (
     Rotations,
@@ -150,9 +150,7 @@ class RunFile:
         """The scene by which a line is recorded."""
         return scene if self._alone is None else self._alone
 
-    def line_rows(
-        self, line: LineResult, found: LinesAtRest | None, outputs: int, manager: DomainManager | None
-    ) -> Rows:
+    def line_rows(self, line: RunLine, found: LinesAtRest | None, outputs: int, manager: DomainManager | None) -> Rows:
         """The result of a line: a part of that of the run, or that itself; manager: of zones that move."""
         texts = {"scene": partial(scene_text, line.scene)} if self._alone is None else self._texts
         notes = {PENDING: self._asks.pending, RODS_AT_START: reasons_at_start(manager)}

@@ -31,9 +31,9 @@ from hybrid.model.resolution import Resolution, start_vibrations
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import energy_gains_text, slack_remedy
-from hybrid.simulation.line_result import FORCE_COLUMNS, LineResult
 from hybrid.simulation.parts import Part
 from hybrid.simulation.run_contact import RunContact
+from hybrid.simulation.run_line import FORCE_COLUMNS, RunLine
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
@@ -473,7 +473,7 @@ class Cuts(Part):
         return text, first
 
     @staticmethod
-    def _own_touch(line: LineResult) -> str:
+    def _own_touch(line: RunLine) -> str:
         """What is said of a line that touches itself where a step fails; empty: it does not."""
         if line.contact is None or not line.contact.touches:
             return ""

@@ -19,9 +19,9 @@ from hybrid.model.resolution import Resolution
 from hybrid.model.sections import OutputPoints
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import LINE, in_full
-from hybrid.simulation import line_result, run_sample
 from hybrid.simulation import progress as module
 from hybrid.simulation import progress as reports
+from hybrid.simulation import run_line, run_sample
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress, ProgressReporter, StatusLine
 from hybrid.simulation.run_sample import ALL, MOST_PLACES, RunSample, at_all_points, compared_places
@@ -70,7 +70,7 @@ def test_a_pre_run_ends_before_the_run_at_places_of_its_own() -> None:
 def test_an_output_does_not_depend_on_those_that_are_looked_at_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case(as_scene(SCENE | {"model": "catenary"}), None)
     together = sample(case)
-    monkeypatch.setattr(line_result, "WAITING", 1)
+    monkeypatch.setattr(run_line, "WAITING", 1)
     assert_same(together, sample(case))
 
 

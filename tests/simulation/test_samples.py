@@ -13,7 +13,7 @@ import pytest
 import hybrid
 import hybrid.simulation.run_record
 from hybrid.errors import SceneError
-from hybrid.simulation import line_result
+from hybrid.simulation import run_line
 from hybrid.store.recorder import Rows
 from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
@@ -63,7 +63,7 @@ def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.Mo
         file, settings = "laying_winch", ["time={duration: 9, step: 0.1}", settings[1]]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / f"{file}.yaml", settings)
     batches = hybrid.run(scene, criterion=criterion)
-    monkeypatch.setattr(line_result, "WAITING", 1)
+    monkeypatch.setattr(run_line, "WAITING", 1)
     one_by_one = hybrid.run(scene, criterion=criterion)
     if name == "cells":
         assert len({x.s.size for x in batches.mesh}) > 1
@@ -108,7 +108,7 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(Rows, "save_batch", counted)
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
-    monkeypatch.setattr(line_result, "WAITING", 1)
+    monkeypatch.setattr(run_line, "WAITING", 1)
     batches.clear()
     one = hybrid.run(scene)
     assert set(batches) == {1}
@@ -225,7 +225,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
     """The same bits at the same times, whatever other outputs there are, and however few of them a buffer takes."""
     many = hybrid.run(moored(0.03, 0.02, 1.2))
     few = hybrid.run(moored(0.03, 0.08, 1.2))
-    monkeypatch.setattr(line_result, "WAITING", 1)
+    monkeypatch.setattr(run_line, "WAITING", 1)
     assert_same(many, hybrid.run(moored(0.03, 0.02, 1.2)))
     assert np.array_equal(many.lines["up"]["steps/dt"], few.lines["up"]["steps/dt"])
     mine = fields(many)

@@ -15,7 +15,7 @@ import hybrid
 from hybrid.errors import ResultError, SceneError
 from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
-from hybrid.simulation import line_result, progress
+from hybrid.simulation import progress, run_line
 from hybrid.simulation import run as run_module
 from tests.scenes import line_between, network_scene
 
@@ -230,7 +230,7 @@ def test_a_line_that_meets_nothing_and_fails_is_named(tmp_path: Path) -> None:
 def test_progress_is_told_whenever_outputs_are_written_down(monkeypatch: pytest.MonkeyPatch) -> None:
     """However few steps there are between two outputs, which may cost more than steps: Ctrl-C is heard there too."""
     monkeypatch.setattr(progress, "REPORT_EVERY", 0.0)
-    monkeypatch.setattr(line_result, "WAITING", 4)
+    monkeypatch.setattr(run_line, "WAITING", 4)
     told: list[float] = []
     every = scene(MEETING, output={"every": 0.05, "points": 7})
     hybrid.run(every, progress=lambda x: told.append(x.t)).close()

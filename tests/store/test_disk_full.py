@@ -20,7 +20,7 @@ import pytest
 
 import hybrid
 from hybrid.simulation import run as run_module
-from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.run_line import RunLine
 from hybrid.store import hdf5_file, writer
 from hybrid.store import whole_file as store
 from hybrid.store.format import Field, Header, MemoryTarget
@@ -275,13 +275,13 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
     points["b"]["motion"] = {"heave": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}
     scene = network_scene(points, {"l": line_between("a", "b", rope, mesh=10)}, time=(1.0, 0.05), output=(0.05, 5))
     calls: list[int] = []
-    write_down = LineResult.write_down
+    write_down = RunLine.write_down
 
-    def counted(line: LineResult) -> None:
+    def counted(line: RunLine) -> None:
         calls.append(sum(len(batch.t) for batch in line._waiting))
         write_down(line)
 
-    monkeypatch.setattr(LineResult, "write_down", counted)
+    monkeypatch.setattr(RunLine, "write_down", counted)
     found = []
     for pause in (0.0, 100.0):
         monkeypatch.setattr(writer, "pause", lambda _, pause=pause: pause)

@@ -20,7 +20,7 @@ from hybrid.accuracy import passes
 from hybrid.errors import ResultError
 from hybrid.exports.api import export
 from hybrid.simulation.case import Case
-from hybrid.simulation.line_result import LineResult
+from hybrid.simulation.run_line import RunLine
 from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field, Header
@@ -620,8 +620,8 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
             seen[t] = self.model.line.s.copy(), self.model.line.spin.astype(bool).copy()
         return output(self, batch)
 
-    output = LineResult.output
-    monkeypatch.setattr(LineResult, "output", shown)
+    output = RunLine.output
+    monkeypatch.setattr(RunLine, "output", shown)
     monkeypatch.setattr(passes, "Case", Spy)
     monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
     result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")

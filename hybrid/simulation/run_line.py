@@ -1,4 +1,4 @@
-"""One line of a network as a result: its outputs, its extremes and what is doubtful about it."""
+"""One line of a run: its outputs, its extremes, and what is doubtful about it."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Wanted(NamedTuple):
 
     # what makes the recorder of a line that starts from an equilibrium or not, with so many outputs after the first;
     # None: it is only to be compared with
-    record: Callable[[LineResult, LinesAtRest | None, int], Rows] | None
+    record: Callable[[RunLine, LinesAtRest | None, int], Rows] | None
     points: OutputPoints | None  # None: those of the scene
 
 
@@ -135,7 +135,7 @@ class Waiting(NamedTuple):
     first_energy: float | None  # J, that the balance counts from
 
 
-class LineResult:
+class RunLine:
     """What is recorded of one line."""
 
     cells: CellChanges | NodeChanges | None = None  # what changes cells, or lets nodes enter and leave, without Python
