@@ -5,7 +5,7 @@
 Scenes are those of the digests, with error figures, and examples and defects that ask for an accuracy.  A constant is
 tried in scenes that call a function which reads it, as seen by the interpreter, the quickest first.  Constants of
 compiled kernels, and those that other constants are made of, are not tried here.  A constant that moves nothing is a guard
-that none of these scenes needs, a price of time or memory, or one that buys nothing: docs/evidence/constants.md.
+that none of these scenes needs, a price of time or memory, or one that buys nothing: docs/evidence/accuracy.md.
 """
 
 from __future__ import annotations
