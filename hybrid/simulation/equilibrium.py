@@ -352,7 +352,7 @@ def _on_many_cells(asked: _Asked, group: Group, held: bool) -> LinesAtRest:
     Of several lines only where no other way leads to one: they have more equilibria, and that beside the first places
     is meant.
     """
-    if held:
+    if held or asked.begin is not None:  # which is a shape of these cells
         return _on_its_side(asked, group)
     if len(group.lines) == 1:
         return _by_coarser(asked, group) or _on_its_side(asked, group)

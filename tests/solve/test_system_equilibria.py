@@ -16,6 +16,9 @@ from random_scenes import random_network
 from scipy.spatial.transform import Rotation
 
 import hybrid
+from hybrid.errors import ComputationError, Outcome
+from hybrid.simulation import equilibrium
+from hybrid.solve.stepper import LineFailed
 from tests.combinations.pairs import seen_by
 from tests.scenes import network_scene
 
@@ -143,6 +146,25 @@ def test_a_leg_that_lies_slack_hangs_down_from_its_buoy() -> None:
     lies = (long.s > 2.5) & (long.s < 27.0)  # at the anchor the force on the support has a part along the line
     assert np.abs(long.tension[-1][lies]).max() < 1e-9 * long.tension.max()
     assert [x.s_b for x in long.events if x.kind == "slack"] == [30.0]
+
+
+def test_a_start_of_many_cells_is_sought_from_on_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no first place leads to an equilibrium others are tried: a state of the lines' cells, not of fewer ones."""
+    cells = []
+
+    def fails(asked: Any, group: Any, start: Any = None, quick: bool = False) -> Any:
+        states = next(asked.starts())[1].lines
+        cells.append([(x.line.h.size, state.T.size) for x, state in zip(group.lines, states, strict=True)])
+        raise LineFailed(0, Outcome.NOT_CONVERGED, None, None)
+
+    monkeypatch.setattr(equilibrium, "_on_its_side", fails)
+    scene = slack_mooring()
+    for line in scene["lines"].values():
+        line["mesh"] = {"cells": 120}
+    with pytest.raises(ComputationError):
+        hybrid.static(scene)
+    assert len(cells) > 5 and {a == b for pairs in cells for a, b in pairs} == {True}
+    assert {a for pairs in cells for a, _ in pairs} > {120}  # fewer ones, from the first places
 
 
 @pytest.mark.long
