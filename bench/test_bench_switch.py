@@ -30,12 +30,13 @@ ROUNDS = 3
 
 
 def timed(call: Callable[..., Any], into: list[float], clock: Callable[[], float] = perf_counter) -> Callable[..., Any]:
-    """The same, with the time (us) that it takes at the end of a list."""
+    """The same, with the time (us) that it takes at the end of a list; calls with an empty list are not counted."""
 
     def with_time(*given: Any) -> Any:
         begin = clock()
         found = call(*given)
-        into.append(1e6 * (clock() - begin))
+        if [] not in given:
+            into.append(1e6 * (clock() - begin))
         return found
 
     return with_time
@@ -45,7 +46,7 @@ def timed(call: Callable[..., Any], into: list[float], clock: Callable[[], float
 def test_switch(mesh: str, monkeypatch: pytest.MonkeyPatch) -> None:
     reviews, switches, first = list[float](), list[float](), list[float]()
     monkeypatch.setattr(DomainManager, "review", timed(DomainManager.review, reviews))
-    monkeypatch.setattr(RunZones, "_switch", timed(RunZones._switch, switches))
+    monkeypatch.setattr(RunZones, "_change", timed(RunZones._change, switches))
     text = touchdown(True)
     for _ in range(ROUNDS + 1):  # the first compiles
         begin = len(switches)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hybrid.errors import refuse_value
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.remesh import Cable, blank_kinds_job, blank_line_job, fill_kinds
-from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
+from hybrid.kernels.mesh.zone_criteria import NodeKinds, blank_kinds
 from hybrid.kernels.state.state import NO_MOVED, NO_PLANE, Floats, Line
 from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material, nodes_at
@@ -369,6 +369,11 @@ class LineOnBase:
         self._line_job, self._kinds_job = Table(blank_line_job), Table(blank_kinds_job)
 
     @property
+    def hinged(self) -> np.ndarray:
+        """(2,) whether ends turn freely."""
+        return np.asarray(self._material.hinges[:2, 0] > 0.0)
+
+    @property
     def cable(self) -> Cable:
         """What lines are made of; its points are those of the forces that the last line had."""
         return self._cable
@@ -386,7 +391,6 @@ class LineOnBase:
         """What criteria know of the nodes of a layout; free: (n,) of base cells; scale: tension scale, N."""
         kinds: NodeKinds = kinds_of(layout.base_of_cell.size, free=free)
         self._kinds_job.bind(cable=self._cable, base_of_cell=layout.base_of_cell, kinds=kinds)
-        self._kinds_job.bind(floor_part=TENSION_FLOOR, least=LEAST_TENSION * scale)
+        self._kinds_job.bind(floor_part=TENSION_FLOOR, least=LEAST_TENSION * scale, hinged=self.hinged)
         fill_kinds(self._kinds_job.numbers)
-        kinds.node[[0, -1]] = np.where(self._material.hinges[:2, 0] > 0.0, HINGE, kinds.node[[0, -1]])
         return kinds

@@ -1,4 +1,4 @@
-"""Cells that follow the curvature, and kinds of cells with them: what changes them between two steps of a run."""
+"""Kinds of cells, and cells that follow the curvature: what changes them between two steps of a run."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from hybrid.kernels.mesh.cell_changes import (
 from hybrid.kernels.mesh.remesh import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.report import PLANAR, REMEMBERS
+from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import kinds_of
 from hybrid.outputs.observation import Output, outputs_in
-from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
+from hybrid.simulation.remesh import BOTH, PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
 from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching
 from hybrid.zones.manager import OF_BASE, Change, all_zones
@@ -63,6 +63,9 @@ def blank_cells(n: int) -> Cells:
     return Cells(np.zeros(n + 1, int), np.zeros(n + 1), np.zeros(n, int), np.zeros(n, bool))
 
 
+layouts, matches = Packed(blank_cells), Packed(lambda n: blank_match(n, n))
+
+
 class CellChanges(Remesh):
     """Changes of the cells of a line of a run, and of what is rod, with the solver that it has now."""
 
@@ -74,15 +77,15 @@ class CellChanges(Remesh):
         self._switching, self._marked = switching, marks_on(layout.base, run.lines[number].marked)
         super().__init__(run, number, int((self._marked != 0).sum()))
         base, most = layout.rod.size, self.most
+        self.follows = bool(switching.zones.clock.share > 0.0)  # its cells follow the curvature: steps change them, too
+        self._hinged = model.line_maker.hinged
         self._starts, self._finest = layout.starts, layout.finest.nodes
         self._piece = model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
         self._first = np.zeros(base + 1, np.int64), np.zeros(base + 1, np.int64)
-        self._kinds, self._zones, self._cells = (
-            (Room(x, most), Room(x, most)) for x in (kinds_of, all_zones, Packed(blank_cells))
-        )
-        self._match = Room(Packed(lambda n: blank_match(n, n)), most)
+        self._kinds, self._zones, self._cells = ((Room(x, most), Room(x, most)) for x in (kinds_of, all_zones, layouts))
+        self._match = Room(matches, most)
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
-        self._shifts, self._places = np.zeros(1, bool), np.zeros(MOST_PLACES, np.int64)
+        self._shifts, self._places = np.array([not self.follows]), np.zeros(MOST_PLACES, np.int64)
 
     def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
@@ -97,10 +100,9 @@ class CellChanges(Remesh):
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
         """Whether cells of a line can change so in a run whose solver is attached."""
         paid = any(x.paying is not None for x in run.lines)
-        if not switching.zones.clock.share > 0.0 or paid or not steps_alone(run, number):
+        if paid or not steps_alone(run, number):
             return False
-        model = run.model.models[number]
-        plain = carries_all(model, switching) and not model.line.bits & REMEMBERS
+        plain = carries_all(run.model.models[number], switching)
         return plain and switching.manager.layout.rod.size >= LEAST_CELLS
 
     # --- arrays -------------------------------------------------------------------------------------
@@ -124,17 +126,18 @@ class CellChanges(Remesh):
     def _in_beside(self, k: int, _: int, m: int) -> dict[str, Any]:
         return self._states_on(k, m) | {"zones": self._zones_on(k, m)}
 
-    def _line_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
+    def _line_job(self, k: int, _: int, m: int) -> dict[str, Any]:
         at, line = self._layout(1 - k, m), self.line(1 - k, m)
         cells: dict[str, Any] = {"nodes": at.s, "base_of_cell": at.of, "rod": at.rods}
         return cells | {"cable": self.model.line_maker.cable, "line": line}
 
-    def _kinds_job(self, k: int, _: int, __: int, m: int) -> dict[str, Any]:
+    def _kinds_job(self, k: int, _: int, m: int) -> dict[str, Any]:
         to, model = 1 - k, self.model
         return {
             "cable": model.line_maker.cable,
             "base_of_cell": self._layout(to, m).of,
             "kinds": self._zones_on(to, m).kinds,
+            "hinged": self._hinged,
             "floor_part": TENSION_FLOOR,
             "least": LEAST_TENSION * self._switching.manager.scale,
         }
@@ -173,12 +176,15 @@ class CellChanges(Remesh):
             "stays": np.zeros(self.most + 1, np.int64),
             "spare": np.zeros(4 * b.EXTREMES * (self.most + 1 + extra)),
         }
-        of_line = shaped(blank_line_job, self._line_job, *PAIRS)
-        self._fill = of_line[2], of_line[0]  # by the side that the line is on
+        of_line, of_kinds = (
+            shaped(blank_line_job, self._line_job, *BOTH),
+            shaped(blank_kinds_job, self._kinds_job, *BOTH),
+        )
+        self._fill = of_line[1], of_line[0]  # by the side that the line is on
         tables = [
-            of_line,
+            [of_line[k] for k, _ in PAIRS],
             shaped(blank_switch_job, self._switch_job, *PAIRS),
-            shaped(blank_kinds_job, self._kinds_job, *PAIRS),
+            [of_kinds[k] for k, _ in PAIRS],
             shaped(blank_renew_job, self._renew_job, *PAIRS),
         ]
         line, switch, kinds, renewed = range(4)
@@ -207,7 +213,7 @@ class CellChanges(Remesh):
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
         model, zones = self.model, self._zones_on(self.side, self.cells)
-        layout = model.zoned._replace(rod=zones.rod.copy(), here=zones.here.copy())
+        layout = model.zoned._replace(rod=zones.rod.copy(), here=zones.here.copy() if self.follows else None)
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         self._switching.set_model(model, zones)
         return model
@@ -218,8 +224,11 @@ class CellChanges(Remesh):
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
         switching, manager, t = self._switching, self._switching.manager, self._run.t
         switching.zones.next_rod[:] = change.rod
-        z.plan_next(switching.table.numbers)
-        self._clamps[:], self._held[:] = switching.clamps(self.model.ends.at_time(t))
+        if self.follows:
+            z.plan_next(switching.table.numbers)
+        ends = self.model.ends.at_time(t)
+        self._solver.place_frames(self._number, self._run.state.bodies)
+        self._clamps[:], self._held[:] = switching.clamps(ends)
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.use_cells_of(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
         clock = switching.zones.clock

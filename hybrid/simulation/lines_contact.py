@@ -254,13 +254,6 @@ class SelfWatch:
         """Go on with a line of other cells, of which steps know."""
         self._model, self._job = model, None
 
-    def set_model(self, model: Model) -> None:
-        """Go on with a line of the same cells."""
-        self._model = model
-        for job in (self._job, self.running):
-            if job is not None:
-                job.bind(line=model.line)
-
     def bends(self) -> tuple[int, dict[str, Any]]:
         """A line of a run is bent, so that every step looks from now on: bits of the last, and its job."""
         self.is_bent, job = True, self.running

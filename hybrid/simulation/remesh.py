@@ -11,7 +11,7 @@ at a winch, where zones stay (simulation.payout_nodes).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 import numpy as np
@@ -25,6 +25,7 @@ from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.newton import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.report import REMEMBERS, SOIL
 from hybrid.kernels.state.state import (
     NO_GRIP,
     NO_PEAK,
@@ -42,6 +43,8 @@ from hybrid.kernels.state.state import (
     Sea,
     State,
     Work,
+    blank_line,
+    blank_state,
     no_sea,
 )
 from hybrid.kernels.step.line_step import RUN, Task, blank_job
@@ -54,14 +57,14 @@ from hybrid.simulation.result_file import Envelope
 from hybrid.solve.contact import SelfContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.stepper import HEAVY
+from hybrid.solve.stepper import HEAVY, NetworkState
 from hybrid.zones.change import states
 
 if TYPE_CHECKING:
     from hybrid.simulation.payout import PayingOut
 
 # What outputs have of nodes and of cells.
-OF_NODES, OF_CELLS = ("r", "v", "vd", "kb"), ("e", "T", "a1", "w", "h")
+OF_NODES, OF_CELLS = ("r", "v", "vd", "kb", "soil"), ("e", "T", "a1", "w", "h")
 
 
 class OfLine(Protocol):
@@ -104,23 +107,12 @@ class OfRun(Protocol):
     @property
     def t(self) -> float: ...
     @property
+    def state(self) -> NetworkState: ...
+    @property
     def lines(self) -> Sequence[OfLine]: ...
     @property
     def asks_quantities(self) -> bool: ...
     def adopt_cells(self, number: int, model: Model, work: Work) -> None: ...
-
-
-class Around(NamedTuple):
-    """What a run knows of a line beside its states.
-
-    envelope: extremes of all meshes; marked: as of `marks_on`; nearest: (2,) the pair of cells that was nearest.
-    """
-
-    work: Work
-    books: Books
-    envelope: Envelope
-    marked: Sequence[tuple[float, int]]
-    nearest: np.ndarray
 
 
 def ends_alone(batches: Sequence[Batch]) -> Batch:
@@ -132,13 +124,9 @@ def ends_alone(batches: Sequence[Batch]) -> Batch:
 
 
 def steps_alone(run: OfRun, number: int) -> bool:
-    """Whether nothing but steps and its watches know of the cells of a line, in a run whose solver is attached.
-
-    Frames of ends that turn with a body are not of the state alone.
-    """
+    """Whether nothing but steps and its watches know of the cells of a line, in a run whose solver is attached."""
     solver = run.solver
-    beside = solver.mixes or solver.touches(number) or solver.turns_with(number)
-    return run.lines[number].contact is None and not beside
+    return run.lines[number].contact is None and not (solver.mixes or solver.touches(number))
 
 
 def watch_beside(line: OfLine) -> LinesWatch | None:
@@ -149,7 +137,9 @@ def watch_beside(line: OfLine) -> LinesWatch | None:
 # What a line that changes so has not, of its fields and of those of its state: `Remesh` is not asked for one that has.
 NO_LAWS: dict[str, Floats] = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
 NO_MEMORY: dict[str, Floats] = {"turn": NO_TURN, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK}
-NO_MEMORY |= {"grip": NO_GRIP, "sheave": NO_SHEAVES, "soil": NO_SOIL}
+NO_MEMORY |= {"grip": NO_GRIP, "sheave": NO_SHEAVES}
+states_in_soil = Packed(partial(blank_state, soil=True), given=[*NO_MEMORY])
+lines_in_soil = Packed(lambda n: blank_line(n)._replace(bed_width=np.zeros(n + 1)), given=("bits", "plane", *NO_LAWS))
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ITSELF = ("line", "old", "new", "itself")
@@ -174,6 +164,20 @@ def blank_kept(n: int, extra: int) -> Books:
     """Books of n cells whose extremes are kept, with those of so many marked nodes."""
     strains, extremes = np.zeros((n + 1, b.STRAINS)), np.zeros((4, b.EXTREMES, n + 1 + extra))
     return b.blank_books(n)._replace(strains=strains, extremes=extremes)
+
+
+def blank_pushes(n: int) -> Pushes:
+    """Room for the pushes of n cells."""
+    return Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4)))
+
+
+of_pushes = Packed(blank_pushes)
+
+
+@cache
+def kept_of(extra: int) -> Packed:
+    """What makes books of which so many marked nodes keep extremes."""
+    return Packed(partial(blank_kept, extra=extra), given=REST_OF_BOOKS)
 
 
 class Part(NamedTuple):
@@ -245,10 +249,13 @@ class Remesh:
         self._alone, self._pairs = run.solver.tables_beside(number)
         self._limits, self._fixed_to = run.solver.limits_by_itself(number), self._key()
         self.most = most = self.model.most_cells
-        kept, pushes = Packed(partial(blank_kept, extra=marked), given=REST_OF_BOOKS), Packed(blank_pushes)
-        self._lines = Room(lines, most), Room(lines, most)
-        self._states = tuple((Room(states, most), Room(states, most)) for _ in range(2))
-        self._pushes, self._kept = (Room(pushes, most), Room(pushes, most)), (Room(kept, most), Room(kept, most))
+        kept = kept_of(marked)
+        bits = self.model.line.bits
+        of_lines, of_states = lines_in_soil if bits & SOIL else lines, states_in_soil if bits & REMEMBERS else states
+        self._memory = NO_MEMORY if bits & REMEMBERS else NO_MEMORY | {"soil": NO_SOIL}
+        self._lines = Room(of_lines, most), Room(of_lines, most)
+        self._states = tuple((Room(of_states, most), Room(of_states, most)) for _ in range(2))
+        self._pushes, self._kept = (Room(of_pushes, most), Room(of_pushes, most)), (Room(kept, most), Room(kept, most))
         self._sea = Room(seas, most)
         self._work = Room(Packed(run.solver.room_beside(number, twice), given=("torsion",)), most)
         self._base = np.zeros(self._line.books.base.size, np.int64)
@@ -348,7 +355,7 @@ class Remesh:
 
     def state(self, k: int, which: int, cells: int) -> State:
         """The state of side k of even (which = 0) or odd parity (1)."""
-        found: State = self._states[k][which].view(cells, **NO_MEMORY)
+        found: State = self._states[k][which].view(cells, **self._memory)
         return found
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
@@ -516,11 +523,6 @@ class Remesh:
             found += self._outputs_now(batches[-1])
         self._at.waiting = self._at.placed = self._at.used = 0
         return found, ends_alone(batches)
-
-
-def blank_pushes(n: int) -> Pushes:
-    """Room for the pushes of n cells."""
-    return Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4)))
 
 
 def copy_fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:

@@ -44,7 +44,7 @@ from hybrid.scene.schema import LineScene
 from hybrid.simulation.diagnostics import Diagnostics, LineStep, Stop
 from hybrid.simulation.events import FASTEST, EventLog, borne_strain, energy_gains_text, note_laid, stretch_text
 from hybrid.simulation.lines_contact import LinesWatch, diameters, least_bending
-from hybrid.simulation.remesh import Around, HasPlane
+from hybrid.simulation.remesh import HasPlane
 from hybrid.simulation.result_file import Envelope, marked_places, marks_on
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.solve.contact import SelfContact
@@ -356,16 +356,6 @@ class RunLine:
         self.books.velocity[:] = before.velocity
         if extremes:
             self.envelope.pass_on(was, before, model, self.books)
-
-    def around(self, work: Work) -> Around:
-        """What changes of kinds have to know of the line."""
-        return Around(work, self.books, self.envelope, self.marked, self.envelope.itself.itself.cells)
-
-    def use_kinds(self, model: Model) -> None:
-        """Go on with other kinds of the same cells, in the same arrays, after what waited has been recorded."""
-        self.model = model
-        self.diagnostics.use_model(model)
-        self.envelope.itself.set_model(model)
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""

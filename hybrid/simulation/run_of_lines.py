@@ -293,14 +293,6 @@ class RunOfLines:
             more = float(self.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
             self.lines[k].books.work[0, b.ZONES] += more
 
-    def go_on_as_attached(self, after: str) -> None:
-        """Go on with the same solver and states, for lines that have changed; after: as of `renew_solver`."""
-        self.gather_events()
-        turns = self.loop.turns
-        self.evaluate_forces(after)
-        self.solver.swap_states(turns)
-        self.loop.stand_after_change()
-
     def evaluate_forces(self, after: str) -> None:
         """The forces of the state of now; after: as of `renew_solver`.  LineFailed: there are none."""
         self.place_ends(self.t)

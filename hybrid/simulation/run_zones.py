@@ -17,31 +17,18 @@ from numpy.typing import NDArray
 from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.mesh.cell_changes import (
-    begin_switch,
-    blank_renew_job,
-    blank_switch_job,
-    clear_state,
-    end_switch,
-    renew,
-)
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME, blank_line_job, fill_line
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, advance_zones
-from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
-from hybrid.kernels.run.newton import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Counts
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import FIELDS, ROD, Ends, Line, State, copied, state_for
+from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
-from hybrid.simulation.cell_changes import CellChanges, carries_all
+from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.parts import Part
-from hybrid.simulation.remesh import Around, copy_fields
 from hybrid.simulation.restart import zoning_of_today
-from hybrid.simulation.result_file import marks_on
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
@@ -99,7 +86,7 @@ class _LineZones:
         clock.letting_go = LETTING_GO * manager.ramp_time
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
-        self.cells: CellChanges | None = None  # what changes its cells without Python
+        self.cells: CellChanges | None = None  # what changes its cells in arrays of their own
 
     def do_phase(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
@@ -142,7 +129,6 @@ class RunZones(Part):
             self._pay(payout)
         self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
         self._compiled = all(x.switching.compiled for x in self.lines)
-        self._kinds: RunKinds | None = None  # of cells that stay, with the solver of now
 
     def _pay(self, payout: RunPayout) -> None:
         """Zones know of the winches of their lines, and these of them."""
@@ -172,20 +158,20 @@ class RunZones(Part):
         if any(x.observer.writes_criteria for x in mine):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
         changes = [self._cells_of(x) for x in self.lines]
-        loop.change_cells([x.job if x is not None else None for x in changes])
+        alone = not loop.counts.asks & b.ASK_BEFORE  # else outputs are made in Python before cells change
+        loop.change_cells([x.job if x is not None and x.follows and alone else None for x in changes])
 
     def _cells_of(self, x: _LineZones) -> CellChanges | None:
-        """What changes cells of a line without Python, with the solver that has the line now; None: nothing does."""
+        """What changes cells of a line in arrays of their own, with the solver that has it now; None: nothing does."""
         if x.cells is not None and not x.cells.fits_zones(x.switching):
             x.cells = self._run.lines[x.number].cells = None
         return x.cells
 
     def _give_cells(self, x: _LineZones) -> None:
-        """Let cells of a line, which are to change after this step, do so without Python, where that can be."""
+        """Let cells of a line, which are to change now, do so in arrays of their own, where that can be."""
         run, (now, then) = self._run, self._run.loop.states
         attached = now is run.state and then is run.other  # else steps are still to begin from what is there now
-        free = attached and not (run.loop.counts.asks & b.ASK_BEFORE or run.loop.counts.samples)
-        if free and self._cells_of(x) is None and CellChanges.may_change(run, x.number, x.switching):
+        if self._cells_of(x) is None and attached and CellChanges.may_change(run, x.number, x.switching):
             run.lines[x.number].write_down()
             run.lines[x.number].cells = x.cells = CellChanges(run, x.number, x.switching)
             x.cells.adopt()
@@ -338,36 +324,23 @@ class RunZones(Part):
         changes = [(x, x.pending) for x in self.lines if x.pending is not None]
         for x in self.lines:
             x.pending = None
-        for x, _ in changes:
-            self._give_cells(x)
         self._change(changes)
 
     def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
         """Carry out changes of lines, in their arrays where that can be."""
-        run = self._run
+        run, rest = self._run, list[tuple[_LineZones, Change]]()
         for x, change in changes:
-            cells = self._cells_of(x)
-            if cells is not None:
-                booked = cells.change() if change.same else cells.change_zones(change)
-                cells.sync()
-                note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)
-        changes = [(x, change) for x, change in changes if x.cells is None]
-        if not changes:
-            return
-        if not RunKinds.apply(run, [x.switching for x, _ in changes]):
-            for x, change in changes:
-                self._switch(x, change)
+            self._give_cells(x)
+            if x.cells is None:
+                rest.append((x, change))
+                continue
+            booked = x.cells.change() if change.same else x.cells.change_zones(change)
+            x.cells.sync()
+            note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)
+        for x, change in rest:
+            self._switch(x, change)
+        if rest:
             run.go_on_changed((), AFTER_CHANGE)
-            return
-        if self._kinds is None or not self._kinds.fits:
-            self._kinds = RunKinds(run)
-        self._kinds.begin()
-        for x, change in changes:
-            run.lines[x.number].write_down()
-            model, booked = self._kinds.change(x.number, x.switching, change)
-            self._note(x, change, model, booked)
-            run.lines[x.number].use_kinds(model)
-        run.go_on_as_attached(AFTER_CHANGE)
 
     def _note(self, x: _LineZones, change: Change, model: Model, booked: float) -> None:
         """A line has changed: its energy (J) is booked, events tell, and the run has its model."""
@@ -435,121 +408,3 @@ class RunZones(Part):
     def changed(self) -> Collection[int]:
         """Of the lines whose zones move."""
         return [x.number for x in self.lines]
-
-
-# Kinds of cells that change between two steps of a run whose cells stay, in the arrays of the run: no solver is made,
-# nothing is bound anew but by the first change; what line and state were is kept beside for as long as a change takes.
-
-# What of a line differs with the kinds of its cells, and lengths that are on their way.
-OF_KINDS = ("h", "spin", "element", "kb", "k0", *(name for name, field in FIELDS.items() if field.rule == ROD))
-
-
-class LineKinds:
-    """Changes of kinds of a line in its arrays: from the second of two states, which are alike, to the first."""
-
-    def __init__(
-        self, model: Model, switching: ZoneSwitching, states: tuple[State, State], around: Around, ends: Ends
-    ) -> None:
-        """From now on the model has a line of its own, which changes; ends: conditions in the arrays of the run."""
-        self._switching, self._numbers, self._ends = switching, np.zeros(NUMBERS), ends
-        line, layout, sea, zones = copied(model.line), model.zoned, model.sea.values, switching.zones
-        self.model = replace(model, line=line)
-        own: dict[str, Any] = {name: getattr(line, name).copy() for name in OF_KINDS}
-        self._before = line._replace(**own)
-        self._rods, self._rods_before = (layout.rod_cells.copy() for _ in range(2))
-        self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
-        self._fill, self._switch, self._renew = Table(blank_line_job), Table(blank_switch_job), Table(blank_renew_job)
-        self._fill.bind(
-            cable=model.line_maker.cable, nodes=line.s, base_of_cell=layout.base_of_cell, rod=self._rods, line=line
-        )
-        (first, second), base = states, np.zeros(layout.rod.size)
-        held, match = (self._clamps, self._held, np.ones(1, bool)), blank_match(model.cells, model.cells)
-        places = layout.places, layout.places, layout.first, switching.kinks
-        transfer = Transfer(self._before, line, second, first, *places, *held, match)
-        self._keeps = zones.keeps.copy()  # of the kinds before
-        self._switch.bind(transfer=transfer, ends=ends, sea=sea, target_sea=sea, target_zones=zones)
-        self._switch.bind(zones=zones._replace(keeps=self._keeps), numbers=self._numbers, guided=switching.guided)
-        work, books, envelope, marked, nearest = around
-        nodes, piece = line.s.size, model.cable.piece(0.5 * (line.s[1:] + line.s[:-1]))
-        self._renew.bind(s=line.s, rods=self._rods_before, to_s=line.s, to_rods=self._rods, line=line)
-        self._renew.bind(place=layout.places, of=layout.base_of_cell, first=layout.first, zones=zones)
-        self._renew.bind(start=envelope.start, envelope_s=envelope.s, bounds=envelope.bounds)
-        self._renew.bind(marked=marks_on(line.s, marked), borne=1.0 + model.cable.max_strain[piece])
-        self._renew.bind(state=first, twin=second, sea=sea, work=work, before=books, books=books)
-        self._renew.bind(push=NO_PUSH, new_push=NO_PUSH, next_push=NO_PUSH, width=np.zeros(0), nearest=nearest)
-        self._renew.bind(stays=np.zeros(nodes, np.int64), spare=np.zeros(books.extremes.size))
-        self._renew.bind(widths=base, scale=model.tension_scale)
-
-    def change(self, change: Change, t: float) -> float:
-        """Other kinds of cells from t (s) on: nothing moves; the energy, J, that is to be booked."""
-        switching, model, numbers = self._switching, self.model, self._numbers
-        for name in OF_KINDS:
-            getattr(self._before, name)[:] = getattr(model.line, name)
-        self._keeps[:] = switching.zones.keeps
-        layout = model.zoned._replace(rod=change.rod.copy())
-        self._rods_before[:], self._rods[:] = self._rods, layout.rod[model.zoned.base_of_cell]
-        self._clamps[:], self._held[:] = switching.clamps(self._ends)
-        numbers[TIME], numbers[RELAXES] = t, switching.zones.counts.relaxing
-        fill_line(self._fill.numbers)
-        clear_state(self._renew.numbers)
-        begin_switch(self._switch.numbers)
-        switching.manager.adopt_rods(change.rod, change, t)
-        end_switch(self._switch.numbers)
-        renew(self._renew.numbers)
-        self.model = replace(model, layout=layout, zones=layout.zones)
-        switching.set_model(self.model, switching.zones)
-        return float(numbers[AFTER] - numbers[BEFORE])
-
-
-class RunKinds:
-    """Changes of kinds in the lines of a run, with the solver, the states and the books that it has now."""
-
-    def __init__(self, run: RunOfLines) -> None:
-        self._run, self._solver, self._turns = run, run.solver, run.loop.turns
-        self._lines: dict[int, LineKinds] = {}
-
-    @staticmethod
-    def apply(run: RunOfLines, switched: Sequence[ZoneSwitching]) -> bool:
-        """Whether zones of these lines can change so between two steps of a run whose solver is attached."""
-        attached = run.solver.turns is not None and run.solver.turns is run.loop.turns
-        alone = run.solver.shared is None and not run.solver.meets
-        alone &= all(line.contact is None and line.paying is None for line in run.lines)
-        if not (attached and alone):
-            return False
-        return all(carries_all(x.model, x) and not x.zones.clock.share > 0.0 for x in switched)
-
-    @property
-    def fits(self) -> bool:
-        """Whether the run is still attached as it was."""
-        run = self._run
-        models = all(run.model.models[k].line is x.model.line for k, x in self._lines.items())
-        return models and run.solver is self._solver and run.loop.turns is self._turns
-
-    def begin(self) -> None:
-        """Before changes: the state of now is the first of the two that take turns, and the second is its copy."""
-        run, (first, second) = self._run, self._turns
-        before, after = (second, first) if run.state is second else (first, second)
-        for old, new in zip(before.lines, after.lines, strict=True):
-            copy_fields(old, new)
-        after.bodies[:] = before.bodies
-        run.state, run.other = first, second
-
-    def change(self, number: int, switching: ZoneSwitching, change: Change) -> tuple[Model, float]:
-        """Other kinds of cells of a line: its model, and the energy (J) that is to be booked."""
-        if number not in self._lines:
-            self._lines[number] = self._line(number, switching)
-        kinds = self._lines[number]
-        kinds.model = switching.model
-        self._solver.work[number].X[:] = 0.0  # kept factors of an unknown that is no more are read as zeros
-        booked = kinds.change(change, self._run.t)
-        return kinds.model, booked
-
-    def _line(self, number: int, switching: ZoneSwitching) -> LineKinds:
-        """A line of the solver that changes from now on."""
-        run, (first, second) = self._run, self._turns
-        line, model, ends = run.lines[number], run.model.models[number], self._solver.lines[number].ends
-        both, around = (first.lines[number], second.lines[number]), line.around(self._solver.work[number])
-        kinds = LineKinds(model, switching, both, around, ends)
-        self._solver.set_line(number, kinds.model.line)
-        switching.model = kinds.model
-        return kinds

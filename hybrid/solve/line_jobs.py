@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE
 from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS
-from hybrid.kernels.junctions.bodies import WORK, U
+from hybrid.kernels.junctions.bodies import FRAME, WORK, U, V, W
 from hybrid.kernels.junctions.body_contact import CARRY, EACH_BODY, TOUCHED, blank_meeting_job, meet_bodies
 from hybrid.kernels.junctions.borders import (
     APART,
@@ -419,12 +419,6 @@ class LineJobs:
         self._group()
         return self._bind_turns()
 
-    def set_line(self, number: int, line: Line) -> None:
-        """A line is in other arrays from now on."""
-        self.lines = tuple(x._replace(line=line) if k == number else x for k, x in enumerate(self.lines))
-        self.bind_line(number, line=line)
-        self._find_torques()
-
     def _find_torques(self) -> None:
         """Torques pass through catenary zones of lines, or do no more, from now on."""
         twists = [bool(x.line.torsion.size) for x in self.lines]
@@ -469,9 +463,14 @@ class LineJobs:
         """Whether a line touches itself, or may touch others."""
         return number in self._touching_lines
 
-    def turns_with(self, number: int) -> bool:
-        """Whether an end of a line turns with a body."""
-        return bool(self.lines[number].seats[:, TURNS].any())
+    def place_frames(self, number: int, bodies: Floats) -> None:
+        """Frames of ends of a line that turn with bodies are as these (B, STATE) are, wherever a try has led to."""
+        ends, joints, seats = self.lines[number].ends, self.lines[number].joints, self.lines[number].seats
+        for k in np.flatnonzero(seats[:, TURNS]):
+            row = bodies[joints[k] - len(self.net)]
+            axes = row[FRAME:V].reshape(3, 3)
+            ends.frame[k] = (axes @ seats[k, :TURNS].reshape(3, 3)).ravel()
+            ends.spin[k] = axes @ row[W : W + 3]
 
     def limits_by_itself(self, number: int) -> Limits:
         """What Newton's method works with in a line that is solved by itself."""

@@ -173,14 +173,6 @@ class NetworkSteps:
             self._job.bind(bodies=self.body_samples, worked=self.worked)
         self.clock.previous = self.clock.now
 
-    def stand_after_change(self) -> None:
-        """The state of now is the first of the two, of lines that have changed: of the step before nothing is known."""
-        assert self._solver is not None
-        if self.counts.parity:
-            self._solver.exchange_pushes()
-        self.clock.previous, self.counts.parity = self.clock.now, 0
-        self.worked[0] = self._solver.body_work
-
     def move(self, solver: NetworkSolver, moves: Sequence[Moves]) -> None:
         """The ends of the lines move so from now on, by their kernels."""
         for k, each in enumerate(moves):

@@ -20,8 +20,8 @@ from hybrid.accuracy import passes
 from hybrid.errors import ResultError
 from hybrid.exports.api import export
 from hybrid.simulation.case import Case
+from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.run_line import RunLine
-from hybrid.simulation.run_zones import RunKinds
 from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field, Header
 from hybrid.store.hdf5_file import SLOTS, bound_metadata, created, in_memory
@@ -623,7 +623,7 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
     output = RunLine.output
     monkeypatch.setattr(RunLine, "output", shown)
     monkeypatch.setattr(passes, "Case", Spy)
-    monkeypatch.setattr(RunKinds, "apply", lambda *_: False)  # outputs of other zones are recorded one by one
+    monkeypatch.setattr(CellChanges, "may_change", lambda *_: False)  # outputs of other zones are recorded one by one
     result = hybrid.run(swinging("adaptive"), tmp_path / "run.h5")
     kinds = {tuple(mesh.kinds) for mesh in result.mesh}
     assert len(kinds) > 3 and len(result.mesh) == len(result.times) == len(seen)

@@ -15,7 +15,7 @@ from problems import Scene, pinned, scene
 
 import hybrid
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.simulation.run_zones import RunKinds
+from hybrid.simulation.cell_changes import CellChanges
 from hybrid.store.reader import Result
 from hybrid.zones import change as zone_changes
 
@@ -172,8 +172,8 @@ def test_compiled_reviews_and_switches_are_those_of_python(
     if share is not None:
         monkeypatch.setattr(zone_changes, "shares_asked", lambda *_: {CURVATURE: share})
     found = []
-    for applies in (RunKinds.apply, lambda *_: False):
-        monkeypatch.setattr(RunKinds, "apply", applies)
+    for may_change in (CellChanges.may_change, lambda *_: False):
+        monkeypatch.setattr(CellChanges, "may_change", may_change)
         found.append(hybrid.run(SCENES[name]()))
     one, other = found
     assert changes(one) and one.events == other.events

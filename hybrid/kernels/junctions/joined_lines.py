@@ -222,10 +222,13 @@ def carry_turn(X, W, columns, first, n, joined, answer):
 
 @inner
 def carry_end_turn(X, W, columns, first, n, answer):
-    """D_i of the turn of what the end is clamped to: it reaches the last two blocks; those before stay zero."""
+    """D_i of the turn of what the end is clamped to: it reaches the last two blocks; those before are zero."""
     g, o = FORCE_BY_TURN, first + n
     for b in range(3):
         x = columns[END_TURN + b]
+        for i in range(first, o - 1):  # where the last two may have been, of other cells
+            for k in range(x.shape[1]):
+                x[i, k] = 0.0
         fx, fy, fz = answer[g + b], answer[g + 3 + b], answer[g + 6 + b]
         put_row(x, o - 1, 0.0, -fx, -fy, -fz, -answer[SPIN_BY_TURN + b])
         carry_block(X, W, x, n - 1, o - 1, n, n - 1, True)

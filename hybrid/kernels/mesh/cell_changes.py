@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.block_elimination import ROW
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub
 from hybrid.kernels.laws.axial_law import stretch_energy
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
@@ -194,6 +193,9 @@ def copy_state(state, out):
         for j in range(3):
             out.r[i, j], out.v[i, j], out.a[i, j] = state.r[i, j], state.v[i, j], state.a[i, j]
             out.vd[i, j], out.slip[i, j], out.bed[i, j] = state.vd[i, j], state.slip[i, j], state.bed[i, j]
+    for i in range(out.soil.shape[0]):
+        for j in range(out.soil.shape[1]):
+            out.soil[i, j] = state.soil[i, j]
     for c in range(state.T.shape[0]):
         out.T[c], out.w[c], out.wa[c], out.wd[c] = state.T[c], state.w[c], state.wa[c], state.wd[c]
         for j in range(3):
@@ -238,18 +240,21 @@ def begin_anew(job, state, s, line):
     clear(job.sea.flow)
     for j in range(job.work.report.shape[0]):
         job.work.report[j] = 0.0
-    X = job.work.X
-    for k in range(X.shape[0] if X.shape[0] > line.s.shape[0] * ROW else 0):
-        X[k] = 0.0  # factors that serve again are read as zeros where there is no unknown any more
+    for k in range(job.work.X.shape[0]):
+        job.work.X[k] = 0.0  # factors are read as zeros where there is no unknown any more
     job.nearest[0], job.nearest[1] = -1, -1
     job.books.clock.wave_step, job.books.counts.parity = wave_step(line, job.scale), 0
 
 
 @kernel
 def clear_state(table):
-    """What a change does not carry to the cells of a catenary, and what forces have worked in."""
+    """What a change does not carry to the cells of a catenary, and what forces have worked in; widths in soil."""
     job = read_renew(table)
-    state = job.state
+    state, width, s, of = job.state, job.line.bed_width, job.to_s, job.of
+    for i in range(width.shape[0]):
+        a, b, last = max(i - 1, 0), min(i, of.shape[0] - 1), of.shape[0]
+        before, after = s[i] - s[a], s[min(i + 1, last)] - s[i]
+        width[i] = (before * job.widths[of[a]] + after * job.widths[of[b]]) / (before + after)
     clear(state.a1)
     clear(state.bed)
     for c in range(state.T.shape[0]):
@@ -292,12 +297,16 @@ def renew(table):
 def before_forces(table):
     """What the assembly of a state as it is has to know; table: of a kernels.step.line_step.Job of parity 0."""
     job = read(table)
-    clock = job.books.clock
-    ends_at(clock.now, job.moves, job.sea, job.ends, job.books.velocity)
+    clock, ends = job.books.clock, job.ends
+    frames, spins = (get9(ends.frame, 0), get9(ends.frame, 1)), (get3(ends.spin, 0), get3(ends.spin, 1))
+    ends_at(clock.now, job.moves, job.sea, ends, job.books.velocity)
     for k in range(2):
-        if job.ends.held[k] == JOINED:
+        if ends.held[k] == JOINED:  # at what moves, and may turn, with the other lines
             for i in range(3):
-                job.ends.position[k, i] = job.old.r[k * job.line.h.shape[0], i]
+                ends.position[k, i] = job.old.r[k * job.line.h.shape[0], i]
+                ends.spin[k, i] = spins[k][i]
+            for i in range(9):
+                ends.frame[k, i] = frames[k][i]
     sea_at(clock.now, job.sea)
     clear(job.work.u)
     if job.line.bits & WAVES:

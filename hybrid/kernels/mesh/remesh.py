@@ -1,6 +1,6 @@
 """Other cells for a line in the middle of a run.
 
-There is one road for cells that follow and nodes at a winch.
+There is one road for kinds of cells, cells that follow, and nodes at a winch.
 
 Two sets of arrays with room for the most cells, the sides, take turns: a change goes from one to the other, and the
 tables of the run get the numbers of the other one.  A planner says whether a change is due and how many cells there
@@ -28,7 +28,7 @@ from hybrid.kernels.laws.element import put_spring
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import NamedNumbers, by_reference, caller, reader, rows
-from hybrid.kernels.mesh.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds
+from hybrid.kernels.mesh.zone_criteria import HINGE, LOAD, SMOOTH, STEP, NodeKinds
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.state import (
@@ -444,6 +444,7 @@ class KindsJob(NamedTuple):
     cable: Cable
     base_of_cell: NDArray[np.int64]  # (N,)
     kinds: NodeKinds
+    hinged: NDArray[np.bool_]  # (2,) whether ends turn freely
     floor_part: float  # of (EI w^2)^(1/3) that a tension must have
     least: float  # N, that it must have whatever the cable
 
@@ -507,6 +508,8 @@ def fill_kinds(table):
         at_base = i == 0 or i == n or a != b
         if at_base and cable.load[b if i < n else b + 1]:
             kinds.node[i] = LOAD
+        if (i == 0 and job.hinged[0]) or (i == n and job.hinged[1]):
+            kinds.node[i] = HINGE
         kinds.floor[i] = max(job.floor_part * (kinds.EI[i] * kinds.w[i] ** 2) ** (1.0 / 3.0), job.least)
         if i < n:
             kinds.base_of_cell[i] = of[i]

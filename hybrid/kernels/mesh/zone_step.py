@@ -448,20 +448,27 @@ def read_arcs(table):
         job.zones.true[c] = job.line.s[c + 1] - job.line.s[c] - less
 
 
+@inner
+def plan_from(job, state):
+    """`plan_cells` by a state; where none has been weighed on these cells yet it turns as this one."""
+    zones, clock = job.zones, job.zones.clock
+    if not zones.counts.known:
+        find_turns(job.line, zones.tangents, state.e, state.a1, state.T, clock.torque, zones.kinds)
+    plan_cells(job.line, job.sea, state, zones, clock.dt, clock.fineness)
+
+
 @kernel
 def plan_nodes(table):
     """Places of nodes for the state `new` of a job and rods zones.next_rod, into zones.plan."""
     job = read(table)
-    clock = job.zones.clock
-    plan_cells(job.line, job.sea, job.new, job.zones, clock.dt, clock.fineness)
+    plan_from(job, job.new)
 
 
 @kernel
 def plan_next(table):
     """`plan_nodes` between two steps of a run, for the state that it has come to."""
     job = read(table)
-    clock, state = job.zones.clock, job.new if job.counts.parity else job.old
-    plan_cells(job.line, job.sea, state, job.zones, clock.dt, clock.fineness)
+    plan_from(job, job.new if job.counts.parity else job.old)
 
 
 @kernel
