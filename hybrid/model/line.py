@@ -195,11 +195,9 @@ def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
 
 def bed_width(material: Material, h: Floats, of: np.ndarray) -> Floats:
     """`bed_width` (N+1,) m of a line with cells of lengths h (N,) m on pieces `of` (N,): means."""
-    total, length = np.zeros(h.size + 1), np.zeros(h.size + 1)
-    for side in (slice(1, None), slice(None, -1)):
-        total[side] += h * material.outer_diameter[of]
-        length[side] += h
-    return np.asarray(total / length)
+    D, before, after = material.outer_diameter[of], np.concatenate([[0.0], h]), np.concatenate([h, [0.0]])
+    one, other = np.concatenate([D[:1], D]), np.concatenate([D, D[-1:]])
+    return np.asarray(one + after / (before + after) * (other - one))
 
 
 def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:

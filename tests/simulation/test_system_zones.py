@@ -88,7 +88,7 @@ def test_fibre_ropes_keep_their_mean_tensions_when_another_line_breaks() -> None
     assert np.abs(rope.tension - cable.tension).max() < 1e-3 * cable.tension.max()
 
 
-def on_a_body() -> dict[str, Any]:
+def on_a_body(bed: Tables | None = None) -> dict[str, Any]:
     """The same ropes at a body, over a bed with friction, one of them with its foot moving: they come to rods and go."""
     scene = mooring()
     scene["points"].pop("float")
@@ -103,7 +103,7 @@ def on_a_body() -> dict[str, Any]:
             "hydrostatics": {"heave": 5e4, "roll": 1e5, "pitch": 1e5},
         },
     }  # fmt: skip
-    scene["environment"] = SEA | {"seabed": {"z": -40, "stiffness": 1e4, "friction": 0.5}}
+    scene["environment"] = SEA | {"seabed": {"z": -40} | (bed or {"stiffness": 1e4, "friction": 0.5})}
     scene["time"] = {"duration": 3.0, "step": 0.02}
     scene["output"] = {"every": 0.1, "points": 31}
     return scene
@@ -270,10 +270,24 @@ def on_a_body_cells(held: str = "end", model: Tables | None = None, count: int =
     )  # fmt: skip
 
 
+RUBS = {"axial": 0.4, "lateral": 0.6, "residual": [0.2, 0.3], "breakout": 0.05, "travel": 0.5}
+
+
+def on_a_bed_that_breaks_out() -> Tables:
+    return on_a_body({"stiffness": 1e4, "friction": RUBS})
+
+
+def on_soil() -> Tables:
+    return on_a_body({"soil": {"shear_strength": 1500.0, "gradient": 2000.0, "lateral": {}}, "friction": RUBS})
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("make", "means"),
-    [(followed, 1e-5), (with_ends_exchanged, 1e-5), (crane, 1e-5), (mooring, 1e-5), (on_a_body, 2e-5), (on_a_body_cells, 1e-5)],
+    [
+        (followed, 1e-5), (with_ends_exchanged, 1e-5), (crane, 1e-5), (mooring, 1e-5), (on_a_body_cells, 1e-5),
+        (on_a_body, 2e-5), (on_a_bed_that_breaks_out, 2e-5), (on_soil, 2e-5),
+    ],
 )  # fmt: skip
 def test_cells_of_joined_lines_change_in_arrays_of_their_own_as_with_a_new_solver(
     make: Callable[[], Tables], means: float, monkeypatch: pytest.MonkeyPatch

@@ -252,9 +252,9 @@ def clear_state(table):
     job = read_renew(table)
     state, width, s, of = job.state, job.line.bed_width, job.to_s, job.of
     for i in range(width.shape[0]):
-        a, b, last = max(i - 1, 0), min(i, of.shape[0] - 1), of.shape[0]
-        before, after = s[i] - s[a], s[min(i + 1, last)] - s[i]
-        width[i] = (before * job.widths[of[a]] + after * job.widths[of[b]]) / (before + after)
+        a, b, n = max(i - 1, 0), min(i, of.shape[0] - 1), of.shape[0]
+        one, after = job.widths[of[a]], s[min(i + 1, n)] - s[i]
+        width[i] = one + after / (s[i] - s[a] + after) * (job.widths[of[b]] - one)
     clear(state.a1)
     clear(state.bed)
     for c in range(state.T.shape[0]):
