@@ -77,7 +77,7 @@ class CellChanges(Remesh):
         self._switching, self._marked = switching, marks_on(layout.base, run.lines[number].marked)
         super().__init__(run, number, int((self._marked != 0).sum()))
         base, most = layout.rod.size, self.most
-        self.follows = bool(switching.zones.clock.share > 0.0)  # its cells follow the curvature: steps change them, too
+        self.in_steps = bool(switching.zones.clock.share > 0.0)  # its cells follow the curvature
         self._hinged = model.line_maker.hinged
         self._starts, self._finest = layout.starts, layout.finest.nodes
         self._piece = model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
@@ -85,7 +85,7 @@ class CellChanges(Remesh):
         self._kinds, self._zones, self._cells = ((Room(x, most), Room(x, most)) for x in (kinds_of, all_zones, layouts))
         self._match = Room(matches, most)
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
-        self._shifts, self._places = np.array([not self.follows]), np.zeros(MOST_PLACES, np.int64)
+        self._shifts, self._places = np.array([not self.in_steps]), np.zeros(MOST_PLACES, np.int64)
 
     def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
@@ -213,7 +213,7 @@ class CellChanges(Remesh):
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
         model, zones = self.model, self._zones_on(self.side, self.cells)
-        layout = model.zoned._replace(rod=zones.rod.copy(), here=zones.here.copy() if self.follows else None)
+        layout = model.zoned._replace(rod=zones.rod.copy(), here=zones.here.copy() if self.in_steps else None)
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         self._switching.set_model(model, zones)
         return model
@@ -224,7 +224,7 @@ class CellChanges(Remesh):
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
         switching, manager, t = self._switching, self._switching.manager, self._run.t
         switching.zones.next_rod[:] = change.rod
-        if self.follows:
+        if self.in_steps:
             z.plan_next(switching.table.numbers)
         ends = self.model.ends.at_time(t)
         self._solver.place_frames(self._number, self._run.state.bodies)

@@ -239,6 +239,7 @@ class Remesh:
     beside: tuple[str, ...] = ()  # of the table of what moves beside the run, what depends on the cells
     most_waiting = 0  # lines whose outputs may wait
     per_node = 0  # numbers of a node that are kept for them, at most
+    in_steps = True  # whether steps change cells without Python
 
     def __init__(self, run: OfRun, number: int, marked: int, twice: bool = False) -> None:
         """Room for the most cells; `adopt` before the first change.

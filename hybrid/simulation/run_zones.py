@@ -159,7 +159,7 @@ class RunZones(Part):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_STEPS
         changes = [self._cells_of(x) for x in self.lines]
         alone = not loop.counts.asks & b.ASK_BEFORE  # else outputs are made in Python before cells change
-        loop.change_cells([x.job if x is not None and x.follows and alone else None for x in changes])
+        loop.change_cells([x.job if x is not None and x.in_steps and alone else None for x in changes])
 
     def _cells_of(self, x: _LineZones) -> CellChanges | None:
         """What changes cells of a line in arrays of their own, with the solver that has it now; None: nothing does."""
@@ -334,6 +334,8 @@ class RunZones(Part):
             if x.cells is None:
                 rest.append((x, change))
                 continue
+            if not x.cells.in_steps:
+                run.lines[x.number].write_down()  # of the zones before
             booked = x.cells.change() if change.same else x.cells.change_zones(change)
             x.cells.sync()
             note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)

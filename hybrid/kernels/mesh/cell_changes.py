@@ -315,6 +315,9 @@ def before_forces(table):
         friction_axes(job.sea, job.old.r, job.old.e, job.old.slip, job.old.grip)
     if job.line.bits & SOIL:
         lie_in_soil(job.line, job.sea, job.old.r, job.old.soil)
+        for i in range(job.new.soil.shape[0]):  # a run goes on from either
+            for k in range(job.new.soil.shape[1]):
+                job.new.soil[i, k] = job.old.soil[i, k]
 
 
 @kernel
