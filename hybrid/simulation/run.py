@@ -379,6 +379,7 @@ class Run(RecordedRun):
 
     def release(self, weakness: Weakness, why: str) -> None:
         """Let ends of lines go now, between two steps; why: for the event.  LineFailed."""
+        self.record_samples()  # of ends as they were until now
         for part in self.parts:
             part.break_now(weakness, why)
 

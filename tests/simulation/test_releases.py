@@ -126,6 +126,21 @@ def test_a_simulation_releases_and_takes_it_back(model: Any) -> None:
     np.testing.assert_allclose(result.position[()], places, rtol=0, atol=1e-9)
 
 
+def test_outputs_before_a_release_are_of_an_end_that_was_held() -> None:
+    """They wait until there are more of them."""
+    found = []
+    for lets_go in (False, True):
+        with hybrid.Simulation(scene(CLAMP, model="rod")) as simulation:
+            simulation.advance(0.31)
+            simulation.advance(0.47)
+            if lets_go:
+                simulation.release("end")
+            simulation.advance(0.6)
+            result = simulation.result()
+        found.append(result["reaction_end"][result.times < 0.47])
+    assert len(found[0]) > 3 and found[0].any(axis=1).all() and np.array_equal(*found)
+
+
 ZONES = {"kind": "zones", "zones": [{"rod": 2.0, "cells": 6}, {"catenary": 6.0, "cells": 12}, {"rod": 2.0, "cells": 6}]}
 
 
