@@ -462,9 +462,8 @@ class RunLine:
                 self._ratios.append(np.repeat(now[None], len(batch.t), axis=0))
         full = sum(len(x.t) for x in self._waiting) >= self._most
         full |= sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE
-        full |= (
-            self.cells is not None and self.cells.in_steps and bool(self._waiting)
-        )  # of cells that change before others know
+        if self.cells is not None and self.cells.in_steps:  # which change, and these with them
+            full |= bool(self._waiting)
         if full or not self._moves:
             self.write_down()
 
