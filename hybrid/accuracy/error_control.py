@@ -167,8 +167,7 @@ class ErrorController:
     def without_refinement(self, why: str) -> None:
         """Say what the result misses as it is, where a finer one did not come to its end."""
         for line in self.lines.values():
-            if line.estimate is not None:
-                line.without_refinement(why)
+            line.note_missed(why)
 
     # --- how finely -----------------------------------------------------------------------------
 

@@ -512,18 +512,9 @@ class Estimate:
         known = every_of(self._count, self._model_every)
         model = {name: at_all_outputs(np.asarray(x), known, 0, self._count) for name, x in self._model.items()}
         changes = {name: np.array(x) for name, x in self.changes.items()}
-        found: Tree = {
-            "order": self.order,
-            "at_start": self.at_start,
-            "share_unknown": self.share_unknown,
-            "shares_mixed": sorted(self.shares_mixed),
-            "falls": self.falls,
-            "changes": changes,
-            "start": np.array(self.start),
-            "late": by_step,
-            "cells": by_mesh,
-            "model": model,
-        }
+        found: Tree = {x: getattr(self, x) for x in ("order", "at_start", "share_unknown", "falls")}
+        found |= {"shares_mixed": sorted(self.shares_mixed), "changes": changes, "start": np.array(self.start)}
+        found |= {"late": by_step, "cells": by_mesh, "model": model}
         of = dict(zip(MODEL_OF, self._model_of, strict=True))
         found |= {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
         between = {name: {"errors": x.errors, "order": x.order} for name, x in self.between.items()}

@@ -13,7 +13,7 @@ a period in every run: outputs meet that by chance, and few of them show hardly 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import prod
 from typing import NamedTuple
@@ -361,7 +361,7 @@ def steps_in_rise(t: Floats, F: Floats) -> float:
     return float(np.median(counts)) if counts else 0.0
 
 
-def joined(times: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def joined(times: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     """The same without overlaps, in order."""
     out: list[tuple[float, float]] = []
     for begin, end in sorted(times):

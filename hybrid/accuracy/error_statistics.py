@@ -45,7 +45,7 @@ from hybrid.accuracy.error_order import (
 from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.run_sample import END_FORCES, RunSample
+from hybrid.simulation.run_sample import END_FORCES, RunSample, every_of
 from hybrid.store.integrity import Tree, matched
 from hybrid.store.limits import EXTREMES, OF_SECTIONS, RANGES
 
@@ -133,15 +133,7 @@ class ExtremeErrors:
 
     def checkpoint(self) -> Tree:
         """All but the run, as named arrays and plain values."""
-        return {
-            "errors": dict(self.errors),
-            "changes": dict(self.changes),
-            "before": dict(self.before),
-            "refined": self.refined,
-            "of_steps": dict(self.of_steps),
-            "orders": dict(self.orders),
-            "results": self.results,
-        }
+        return {name: x for name, x in vars(self).items() if name != "run"}
 
     @classmethod
     def restored(cls, tree: Any, run: RunSample) -> ExtremeErrors:
@@ -266,7 +258,8 @@ def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
     every: outputs of the result to one that counts; forces at the ends count at every step.  Reactions become
     (magnitude, 0, 0).  Errors of neglected bending are those at the extremes, and their root mean square.
     """
-    values = {name: _scalar(name, _thinned(np.asarray(x), every // run.every)) for name, x in run.values.items()}
+    values = {name: np.asarray(x)[every_of(len(x), every // run.every)] for name, x in run.values.items()}
+    values |= {name: np.linalg.norm(values[name], axis=-1) for name in END_FORCES if name in values}
     count = len(next(iter(values.values()), ()))
     windows = max(1, min(WINDOWS, count * every // LEAST))
     found = {name: _statistics(x, windows) for name, x in values.items()}
@@ -389,14 +382,6 @@ def resolves_snaps(run: RunSample) -> bool:
     return max(steps_in_rise(t, run.forces[:, k]) for k in (1, 2)) >= STEPS_IN_RISE
 
 
-def _thinned(x: np.ndarray, step: int) -> np.ndarray:
-    return np.asarray(x)[np.unique(np.append(np.arange(0, len(x), step), len(x) - 1))]
-
-
-def _scalar(name: str, x: np.ndarray) -> np.ndarray:
-    return np.asarray(np.linalg.norm(x, axis=-1)) if name in END_FORCES else x
-
-
 def _windows(x: np.ndarray, windows: int) -> Iterator[np.ndarray]:
     """The outputs after the first, in windows of about the same length."""
     later = x[1:] if len(x) > 1 else x
@@ -434,7 +419,7 @@ def _model_errors(run: RunSample, values: Mapping[str, np.ndarray], every: int, 
     for name, field in run.model_error.items():
         if not len(field):
             continue
-        error, value = _thinned(np.asarray(field), every // run.every), named.get(name)
+        error, value = np.asarray(field)[every_of(len(field), every // run.every)], named.get(name)
         level = np.sqrt(np.mean(error * error, axis=0))
         if value is None or value.shape != error.shape:  # of vectors: no extreme of a component
             out[name] = np.stack([np.max(error, axis=0), level, level, level])[:, None]

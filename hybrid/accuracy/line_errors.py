@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from hybrid.accuracy.error_estimate import NOTHING, Estimate
-from hybrid.accuracy.error_order import COARSER, Errors, errors_between, finer_between, snap_excess
+from hybrid.accuracy.error_order import COARSER, errors_between, finer_between, snap_excess
 from hybrid.accuracy.error_statistics import (
     LARGEST,
     STATISTICS,
@@ -227,16 +227,6 @@ class LineErrors:
         misses = found.ratio > 1.0 and found.model > MOST_OF_MODEL
         return f"leaving bending out makes {100 * found.model:.2g} % of what is asked" if misses else ""
 
-    def without_refinement(self, why: str) -> tuple[RunSample, Errors]:
-        """The result as it is and its errors, where a finer one did not come to its end."""
-        assert self.estimate is not None
-        run, errors = self.estimate.run, self.estimate.errors
-        if self.asked is not None:  # else its model error was to be followed
-            verdict = self.verdict(self.asked)
-            if verdict.ratio > 1.0:
-                self.own_notes.append(("accuracy missed", f"{verdict.text}; {why}"))
-        return run, errors
-
     def first_estimate(self, result: RunSample, faster: Callable[[], RunSample | None] = lambda: None) -> bool:
         """Compare the first result with the coarser runs; False: they say nothing of its errors.
 
@@ -399,14 +389,17 @@ class LineErrors:
         diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
         return bool(diverges) or is_chance(self.statistics, verdict.statistic, name)
 
-    def note_missed(self) -> None:
-        """Say that what was asked is not met, if so, whose doing it is, and what to try."""
+    def note_missed(self, why: str = "") -> None:
+        """Say that what was asked is not met, if so, whose doing it is, and what to try.
+
+        why: a finer result did not come to its end; empty: none was to follow.
+        """
         if self.asked is None or self.estimate is None:
             return
         verdict = self.verdict(self.asked)
         if verdict.ratio > 1.0:
             text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict), self.stopped)
-            self.own_notes.append(("accuracy missed", text))
+            self.own_notes.append(("accuracy missed", f"{verdict.text}; {why}" if why else text))
 
     def checkpoint(self) -> Tree:
         """What it has found until now, as named arrays and plain values."""

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.accuracy.error_order import magnitude
+from hybrid.accuracy.error_order import joined, magnitude
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.model.build import Model
 from hybrid.model.mesh import GROWTH, Grading
@@ -124,7 +124,7 @@ def leaves_bending_out(line: JoinedLine, run: RunSample) -> bool:
         return False
     if run.catenary.size:  # zones have moved
         return bool(run.catenary.any())
-    return sum(b - a for a, b in _joined(run.rods)) < line.cable.length * (1 - 1e-9)
+    return sum(b - a for a, b in joined(run.rods)) < line.cable.length * (1 - 1e-9)
 
 
 def as_rods(
@@ -160,17 +160,6 @@ def _difference(run: RunSample, rods: RunSample, ends: Iterable[_EndCell]) -> di
     for x in ends if "curvature" in found else ():
         found["curvature"][:, x.within] = found["curvature"][:, list(x.nodes)] @ x.parts
     return found
-
-
-def _joined(stretches: Stretches) -> list[tuple[float, float]]:
-    """The same without overlaps, in order."""
-    out: list[tuple[float, float]] = []
-    for a, b in sorted(stretches):
-        if out and a <= out[-1][1]:
-            out[-1] = out[-1][0], max(b, out[-1][1])
-        else:
-            out.append((a, b))
-    return out
 
 
 def _nodes(model: Model, rods: Stretches) -> np.ndarray:

@@ -16,9 +16,9 @@ from __future__ import annotations
 import io
 import json
 import time as clock
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,7 +99,7 @@ from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import not_converged_attribute
 from hybrid.store.stored_rows import remove_rows
 from hybrid.store.whole_file import LateFile
-from hybrid.store.writer import Block, Happened, Part, amend, may_be_amended
+from hybrid.store.writer import Block, Happened, Others, Part, amend, may_be_amended
 from hybrid.zones.manager import UserCriterion
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ CAUSES = {
 }
 
 
-Attributes = Mapping[str, str | float | int]
+Added = dict[str, Others]  # attributes and events, by line
 
 
 def write_errors(
@@ -135,49 +135,28 @@ def write_errors(
 
         return lost_by_lines(case.scene, control.standing)
 
-    found = {
-        name: _of_line(case, control, name, cpu, lambda name=name: lost().get(name, {}))  # type: ignore[misc]
-        for name in control.standing
-    }
+    added = dict[str, Others]()
 
-    def of_all(_: Happened) -> tuple[Attributes, list[tuple[str, str]]]:
-        known = [x.attributes for x in found.values()]
+    def of_all(_: Happened) -> Others:
+        known = [attributes for attributes, _ in added.values()]
         keys = {x for each in known for x in each if x.startswith("error_")}
         largest: dict[str, str | float | int] = {x: max(float(each[x]) for each in known if x in each) for x in keys}
         largest |= {"effort_runs": len(control.runs), "effort_cpu": cpu}
-        largest |= not_converged_attribute(control.lines[name].diverging for name in found)
-        events = [(kind, f"line {name}: {text}") for name, x in found.items() for kind, text in x.events]
+        largest |= not_converged_attribute(control.lines[name].diverging for name in added)
+        events = [(kind, f"line {name}: {text}") for name, (_, each) in added.items() for kind, text in each]
         return largest, [*control.notes, *events]
 
-    parts = list[Part]()
-    for name, x in found.items():
-        called = case.names[name]  # a line without a name is the result itself
-        parts.append(x.part(f"{GROUP}/{called}", ()) if called else x.part("", control.notes))
+    parts = [_of_line(case, control, name, cpu, lost, added) for name in control.standing]
     amend(target, parts if "" in case.names.values() else [*parts, Part("", (), (), of_all)], before)
 
 
-@dataclass
-class Report:
-    """What is added to the result of a line; attributes and events: once its errors are written."""
+def _of_line(
+    case: Case, control: ErrorController, name: str, cpu: float, lost: Callable[[], Mapping[str, LostBy]], added: Added
+) -> Part:
+    """What is added to the result of a line, and noted in `added` once its errors are written.
 
-    fields: list[Field]
-    blocks: Iterable[Block]
-    others: Callable[[Happened], tuple[dict[str, str | float | int], list[tuple[str, str]]]]
-    attributes: Attributes = field(default_factory=dict)
-    events: Sequence[tuple[str, str]] = ()
-
-    def part(self, group: str, notes: Sequence[tuple[str, str]]) -> Part:
-        """As part of a result; notes: events beside those of the line."""
-
-        def others(happened: Happened) -> tuple[Attributes, list[tuple[str, str]]]:
-            self.attributes, self.events = self.others(happened)
-            return self.attributes, [*self.events, *notes]
-
-        return Part(group, self.fields, self.blocks, others)
-
-
-def _of_line(case: Case, control: ErrorController, name: str, cpu: float, lost: Lost) -> Report:
-    """What is added to the result of a line; cpu: s, of all passes; lost: finds what steps lose of free vibrations."""
+    cpu: s, of all passes; lost: finds what steps lose of free vibrations, by line.
+    """
     line, result, scene = control.lines[name], control.standing[name], case.lines[name]
     errors = line.estimate.errors if line.estimate is not None else None
     attributes = effort(scene, line, result, cpu)
@@ -191,15 +170,18 @@ def _of_line(case: Case, control: ErrorController, name: str, cpu: float, lost: 
                 along = result.places.size and is_along(quantity)
                 yield full, begin, at_all_points(values, result.places) if along else values
 
-    def others(happened: Happened) -> tuple[dict[str, str | float | int], list[tuple[str, str]]]:
-        found, notes = known(scene, line, result, errors, happened, lost)
+    called = case.names[name]  # a line without a name is the result itself
+
+    def others(happened: Happened) -> Others:
+        found, notes = known(scene, line, result, errors, happened, lambda: lost().get(name, {}))
         if line.asked is not None:
             of = [x.errors for x in line.statistics.values()] if line.irregular else [errors]
             each = figures(line.asked, [x for x in of if x is not None], result, line.scattered, line.extremes)
             found["accuracy_verdicts"] = json.dumps(each)
-        return attributes | found, notes
+        added[name] = attributes | found, notes
+        return attributes | found, notes if called else [*notes, *control.notes]
 
-    return Report(fields, blocks(), others)
+    return Part(f"{GROUP}/{called}" if called else "", fields, blocks(), others)
 
 
 def effort(scene: LineScene, control: LineErrors, result: RunSample, cpu: float) -> dict[str, str | float | int]:

@@ -24,7 +24,7 @@ from hybrid.kernels.state.report import BODIES, DRAG, FLOW, SURFACE, WAVES
 from hybrid.kernels.state.state import LANES, RIDES, Floats, Line, Sea, State
 from hybrid.linear.matrices import ANCHOR, LinearLine, LinearNetwork, RestMarch, by_turn, rows_at_rest, sparse_rows
 from hybrid.linear.response_results import LineResponse, axes_across, linear_law, of_cylinders, phases_of
-from hybrid.linear.touching import Rest
+from hybrid.linear.touching import Blocks, Rest, places_of
 from hybrid.model.bodies import Members
 from hybrid.model.build import Model
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
@@ -270,15 +270,9 @@ class LoadedLine:
 
     def full_damping(self) -> sparse.csr_array:
         """Over the unknowns of all blocks."""
-        n = self.line.s.size
-        i = SIZE * np.arange(n)[:, None, None] + 1 + np.arange(3)[None, :, None]
-        j = SIZE * np.arange(n)[:, None, None] + 1 + np.arange(3)[None, None, :]
-        shape = self.blocks.shape
-        drag = sparse.csr_array(
-            (self.blocks.ravel(), (np.broadcast_to(i, shape).ravel(), np.broadcast_to(j, shape).ravel())),
-            shape=(SIZE * n, SIZE * n),
-        )
-        return self.damping + drag
+        at, size, drag = places_of(np.arange(self.line.s.size)), SIZE * self.line.s.size, Blocks()
+        drag.add(at, at, self.blocks)
+        return self.damping + drag.matrix(size, size)
 
     def loads(self, which: np.ndarray, C: sparse.csr_array) -> Floats:
         """Right-hand sides (5 (N+1), F): forces of the water, and motions of held ends."""
@@ -465,17 +459,11 @@ class LoadedMembers:
         Velocity (F, n, 3) m/s, force but for drag (F, n, 3) N, rise of the surface (F, n) m.
         """
         count, n, sea = len(self.omegas), len(rows), members.sea
-        water, push, rise = (
-            np.zeros((count, n, 3), complex),
-            np.zeros((count, n, 3), complex),
-            np.zeros((count, n), complex),
-        )
+        moved = np.zeros((count, n, 7), complex)
         for f, omega in enumerate(self.omegas):
             for wave in sea.waves[np.abs(sea.waves[:, 1] - omega) <= SAME * omega]:
-                found = wave[0] * np.exp(1j * wave[4]) * water_of_wave(sea, wave, self.place)
-                water[f] += found[:, :3]
-                push[f] += found[:, 3:6]
-                rise[f] += found[:, 6]
+                moved[f] += wave[0] * np.exp(1j * wave[4]) * water_of_wave(sea, wave, self.place)
+        water, push, rise = (moved[:, :, at].copy() for at in (slice(3), slice(3, 6), 6))
         across = np.eye(3) - self.d[:, :, None] * self.d[:, None, :]
         force = np.einsum("n,nij,fnj->fni", self.wet * rows[:, CM], across, push)
         ut = np.einsum("ni,ni->n", self.current, self.d)

@@ -100,7 +100,7 @@ def by_layers(line: Line, state: State, sticks: bool, left: Callable[[Line], Flo
     """
     n = state.T.size
     step = PULLED * max(float(np.abs(state.T).max()), 1e-300)
-    rows, columns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+    out = Blocks()
     for first in range(min(4, n)):  # a cell's tension is in the moments of its nodes, and these in four rows
         cells = np.arange(first, n, 4)
         both = []
@@ -111,13 +111,9 @@ def by_layers(line: Line, state: State, sticks: bool, left: Callable[[Line], Flo
         change = (both[0] - both[1]) / (2.0 * step)
         for c in cells.tolist():
             begin = max(c - 1, 0)
-            near = change[begin : c + 3]
-            i, k = np.nonzero(near)
-            rows.append(SIZE * (i + begin) + k)
-            columns.append(np.full(i.size, SIZE * (c + 1)))
-            values.append(near[i, k])
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return sparse.csr_array(entries, shape=(SIZE * (n + 1),) * 2)
+            near = change[begin : c + 3].reshape(-1, 1)
+            out.add(SIZE * begin + np.arange(near.size), [SIZE * (c + 1)], near)
+    return out.matrix(SIZE * (n + 1), SIZE * (n + 1))
 
 
 def with_soil(line: Line, sea: Sea, state: State, turns: bool) -> State:

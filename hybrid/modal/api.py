@@ -118,15 +118,9 @@ class Modes:
 class _ModesOnMesh:
     """A network on one mesh, and its modes."""
 
+    rest: Rest
     network: LinearNetwork
     eigen: Eigen
-    points: tuple[str, ...]
-    bodies: tuple[str, ...]
-    axes: tuple[tuple[Floats, Floats], ...]  # of each body: axes (3, 3), and its mass matrix (6, 6) in these
-    touched: tuple[str, ...]  # obstacles and bodies that lines lie on
-    together: tuple[str, ...]  # lines that touch each other, or themselves
-    sheaves: tuple[str, ...]  # which lines turn
-    tips: Mapping[tuple[str, int], str]  # as of `Rest`
 
 
 def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction: bool = True) -> Modes:
@@ -177,16 +171,7 @@ def _modes_on_mesh(asked: Scene, cells: float, count: int, near: float | None, s
     rest = equilibrium_of(asked, cells, sticks)
     network = linear_network(rest.solver, rest.states, rest.names, sticks, touching=rest.touching)
     count += 2 + len(rest.names) + 3 * network.bodies
-    eigen = lowest_modes(network, count, None if near is None else 2.0 * math.pi / near)
-    axes = tuple(
-        (row[FRAME:V].reshape(3, 3), numbers[MASS : MASS + 36].reshape(6, 6))
-        for row, numbers in zip(rest.states.bodies, rest.solver.bodies, strict=True)
-    )
-    touches, names = network.touching.touches, rest.models[0].sea.names
-    touched = tuple(dict.fromkeys(obstacle_of(x, rest) for x in touches if x.obstacle))
-    together = tuple(dict.fromkeys(name_of(x, rest) for x in touches if not x.obstacle))
-    sheaves = tuple(names[k] for k in network.touching.sheaves)
-    return _ModesOnMesh(network, eigen, rest.points, rest.bodies, axes, touched, together, sheaves, rest.tips)
+    return _ModesOnMesh(rest, network, lowest_modes(network, count, None if near is None else 2.0 * math.pi / near))
 
 
 def equilibrium_of(asked: Scene, cells: float = 1.0, friction: bool = True) -> Rest:
@@ -212,10 +197,10 @@ class _Shape:
         }
         first = network.size - 3 * network.points - 6 * network.bodies
         points, bodies = vector[first : first + 3 * network.points], vector[first + 3 * network.points :]
-        turns = vector[first - len(found.sheaves) : first].tolist()
-        self.sheaves = dict(zip(found.sheaves, turns, strict=True))
-        self.points = dict(zip(found.points, points.reshape(-1, 3), strict=True))
-        self.bodies = dict(zip(found.bodies, bodies.reshape(-1, 6), strict=True))
+        sheaves = [found.rest.models[0].sea.names[k] for k in network.touching.sheaves]
+        self.sheaves = dict(zip(sheaves, vector[first - len(sheaves) : first].tolist(), strict=True))
+        self.points = dict(zip(found.rest.points, points.reshape(-1, 3), strict=True))
+        self.bodies = dict(zip(found.rest.bodies, bodies.reshape(-1, 6), strict=True))
         self.vector = vector
 
     def mode(self, error: float | None) -> Mode:
@@ -250,16 +235,16 @@ class _Shape:
         for x in network.lines:
             part, name, mass = self.parts[x.name], f"{x.name} " if several else "", x.mass - x.standing
             for k, carried in enumerate(x.carried):
-                if point := self.found.tips.get((x.name, k)):
+                if point := self.found.rest.tips.get((x.name, k)):
                     mass = mass - carried
                     out[point] = float(part.ravel() @ (carried @ part.ravel()))
             for word, moved in _directions(x, part).items():
                 out[name + word] = float(moved.ravel() @ (mass @ moved.ravel()))
         first = network.size - 3 * network.points - 6 * network.bodies
         for kind, begin, size, names in (
-            ("sheave", first - len(self.sheaves), 1, self.found.sheaves),
-            ("point", first, 3, self.found.points),
-            ("body", first + 3 * network.points, 6, self.found.bodies),
+            ("sheave", first - len(self.sheaves), 1, self.sheaves),
+            ("point", first, 3, self.points),
+            ("body", first + 3 * network.points, 6, self.bodies),
         ):
             for k, name in enumerate(names):
                 alone = np.zeros(network.size)
@@ -273,9 +258,10 @@ class _Shape:
         """The motion of a body in which most of its energy is, along and about its own axes; "": of a point."""
         if body not in self.bodies:
             return ""
-        frame, mass = self.found.axes[self.found.bodies.index(body)]
+        k, rest = [*self.bodies].index(body), self.found.rest
+        frame, mass = rest.states.bodies[k, FRAME:V].reshape(3, 3), rest.solver.bodies[k, MASS : MASS + 36]
         own = np.concatenate([frame.T @ self.bodies[body][:3], frame.T @ self.bodies[body][3:]])
-        return f", {MOTIONS[int((mass.diagonal() * own**2).argmax())]}"
+        return f", {MOTIONS[int((mass.reshape(6, 6).diagonal() * own**2).argmax())]}"
 
     @property
     def what(self) -> str:
@@ -384,9 +370,10 @@ def _doubts(found: _ModesOnMesh, unstable: int, free: list[str], chosen: np.ndar
             )
     if any(x.line.torsion.size for x in network.lines):
         yield "twist passes through catenary zones as through a torsion spring; what their shape adds is left out"
-    for name in found.touched:
+    touches = network.touching.touches
+    for name in dict.fromkeys(obstacle_of(x, found.rest) for x in touches if x.obstacle):
         yield f"contact with {name} stays as it is at rest: swings that lift the line off have other periods"
-    for name in found.together:
+    for name in dict.fromkeys(name_of(x, found.rest) for x in touches if not x.obstacle):
         yield f"contact of {name} stays as it is at rest: swings that part what touches have other periods"
 
 

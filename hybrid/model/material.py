@@ -490,5 +490,4 @@ def _nearest(places: Floats, wanted: list[float]) -> list[int]:
     x = np.array(wanted, float)
     right = np.clip(np.searchsorted(places, x), 0, places.size - 1)
     left = np.maximum(right - 1, 0)
-    found: list[int] = np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right).tolist()
-    return found
+    return np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right).tolist()

@@ -126,6 +126,10 @@ class NetworkModel:
         """Cells of all lines."""
         return sum(model.cells for model in self.models)
 
+    def with_lines(self, models: Mapping[int, Model]) -> NetworkModel:
+        """The same with other models of some lines, by number."""
+        return replace(self, models=tuple(models.get(k, x) for k, x in enumerate(self.models)))
+
     @cached_property
     def asks_contact(self) -> bool:
         """Whether contact is computed of lines with each other, with themselves or with bodies."""

@@ -379,8 +379,7 @@ def by_kinds(union: Any) -> dict[str, Any]:
 
 
 def _table(arm: Any) -> type[Table]:
-    table: type[Table] = get_args(arm)[0] if get_origin(arm) is Annotated else arm
-    return table
+    return get_args(arm)[0] if get_origin(arm) is Annotated else arm
 
 
 @dataclass(frozen=True)

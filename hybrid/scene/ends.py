@@ -216,8 +216,7 @@ class EndTable(Table):
     @property
     def held_position(self) -> Triple | None:
         """Position that is held, inertial frame [m]."""
-        position: Triple | None = self._value_of("position")
-        return position
+        return self._value_of("position")
 
     @property
     def is_placed(self) -> bool:
@@ -237,14 +236,12 @@ class EndTable(Table):
     @property
     def held_tangent(self) -> Triple | None:
         """Direction that is held, of any length."""
-        tangent: Triple | None = self._value_of("tangent")
-        return tangent
+        return self._value_of("tangent")
 
     @property
     def held_normal(self) -> Triple | None:
         """Direction of the material axis a1 that the scene gives, of any length."""
-        normal: Triple | None = self._value_of("normal")
-        return normal
+        return self._value_of("normal")
 
     @property
     def held_turns(self) -> float:
@@ -280,14 +277,12 @@ class EndTable(Table):
     @property
     def prescribed_motion(self) -> Motion | None:
         """How what is held moves."""
-        motion: Motion | None = self._value_of("motion")
-        return motion
+        return self._value_of("motion")
 
     @property
     def release(self) -> Failure | None:
         """When what is held is let go."""
-        release: Failure | None = self._value_of("release_at")
-        return release
+        return self._value_of("release_at")
 
     @property
     def loads(self) -> tuple[GivenLoad, ...]:

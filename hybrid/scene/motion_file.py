@@ -561,8 +561,7 @@ def _slope_weights(t: Array) -> Array:
     u = t / scale
     rhs = np.zeros(len(t))
     rhs[1] = 1.0 / scale
-    weights: Array = np.asarray(np.linalg.solve(np.vander(u, increasing=True).T, rhs), dtype=np.float64)
-    return weights
+    return np.asarray(np.linalg.solve(np.vander(u, increasing=True).T, rhs), dtype=np.float64)
 
 
 def _kinks(times: Array, x: Array, unit: Array, negligible: float, from_rest: bool) -> list[tuple[float, float]]:

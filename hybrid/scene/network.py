@@ -439,8 +439,7 @@ class Network(SceneTables, Asked):
             return replace(self.scene_of(name), **self._between_points(name, carrying, places, directions))
         if key not in known:
             known[key] = self._scene_of(name, carrying)
-        scene: LineScene = known[key]
-        return scene
+        return known[key]
 
     @property
     def scenes_of_lines(self) -> dict[str, LineScene]:

@@ -214,8 +214,7 @@ def _end_of(point: Point, held: Connection) -> End:
     _, called, connected = POINTS[made.model_fields["kind"].default]
     keys = [key for key in made.model_fields if key != "kind"]
     given = {key: getattr(held if key in connected else point, called.get(key, key)) for key in keys}
-    end: End = made(**given)
-    return end
+    return made(**given)
 
 
 def _output(output: Output) -> dict[str, Any]:

@@ -58,12 +58,8 @@ class Cells(NamedTuple):
     rods: np.ndarray
 
 
-def blank_cells(n: int) -> Cells:
-    """Room for a layout of n cells."""
-    return Cells(np.zeros(n + 1, int), np.zeros(n + 1), np.zeros(n, int), np.zeros(n, bool))
-
-
-layouts, matches = Packed(blank_cells), Packed(lambda n: blank_match(n, n))
+layouts = Packed(lambda n: Cells(np.zeros(n + 1, int), np.zeros(n + 1), np.zeros(n, int), np.zeros(n, bool)))
+matches = Packed(lambda n: blank_match(n, n))
 
 
 class CellChanges(Remesh):
@@ -111,12 +107,10 @@ class CellChanges(Remesh):
         zones = self._switching.zones
         kinds = self._kinds[k].view(cells, free=zones.kinds.free)
         given = {"kinds": kinds, **{name: getattr(zones, name) for name in OF_BASE}}
-        found: z.Zones = self._zones[k].view(cells, **given)
-        return found
+        return self._zones[k].view(cells, **given)
 
     def _layout(self, k: int, cells: int) -> Cells:
-        found: Cells = self._cells[k].view(cells)
-        return found
+        return self._cells[k].view(cells)
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -215,7 +209,8 @@ class CellChanges(Remesh):
         model, zones = self.model, self._zones_on(self.side, self.cells)
         layout = model.zoned._replace(rod=zones.rod.copy(), here=zones.here.copy() if self.in_steps else None)
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
-        self._switching.set_model(model, zones)
+        self._switching.model = model
+        self._switching.manager.use_cells_of(layout, zones)
         return model
 
     # --- changes ------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -208,28 +208,14 @@ def _network_of(network: Network, names: Sequence[str]) -> Network:
 def _model_of(model: NetworkModel, part: Sequence[int]) -> NetworkModel:
     """The model of some of its lines: of one that is alone, without what is free, and in its plane."""
     of = [*part]
-    own = replace(
-        model,
-        names=tuple(model.names[k] for k in part),
-        models=tuple(model.models[k] for k in part),
-        joints=tuple(model.joints[k] for k in part),
-        fairleads=model.fairleads[of],
-        seats=model.seats[of],
-        turns=tuple(model.turns[k] for k in part),
-    )
+    some: dict[str, Any] = {x: tuple(getattr(model, x)[k] for k in of) for x in ("names", "models", "joints", "turns")}
+    own = replace(model, fairleads=model.fairleads[of], seats=model.seats[of], **some)
     if not _is_alone(model, part[0]):
         return own
     (x,) = own.models
-    return replace(
-        own,
-        models=(replace(x, line=as_kept(x.line, x.plane, x.kept_in)),),
-        free=(),
-        rigid=(),
-        moments=(),
-        bodies=(),
-        places=model.places[:0],
-        body_places=model.body_places[:0],
-    )
+    none: dict[str, Any] = dict.fromkeys(("free", "rigid", "moments", "bodies"), ())
+    none |= {"places": model.places[:0], "body_places": model.body_places[:0]}
+    return replace(own, models=(replace(x, line=as_kept(x.line, x.plane, x.kept_in)),), **none)
 
 
 def _by_parts(

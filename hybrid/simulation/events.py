@@ -17,7 +17,6 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable, Mapping
-from math import nan
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -48,21 +47,8 @@ class EventLog:
     def __init__(self) -> None:
         self._waiting: list[tuple[tuple[float, float, float, str, str], dict[str, Any]]] = []
 
-    def event(
-        self,
-        t: float,
-        s_a: float,
-        s_b: float,
-        kind: str,
-        text: str,
-        *,
-        criterion: str = "",
-        value: float = nan,
-        threshold: float = nan,
-        energy: float = nan,
-    ) -> None:
+    def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: float | str) -> None:
         """Something happened at time t (s) on s_a <= s <= s_b (m); the rest: as of `Recorder.event`."""
-        more = {"criterion": criterion, "value": value, "threshold": threshold, "energy": energy}
         self._waiting.append(((t, s_a, s_b, kind, text), more))
 
     def waiting(self) -> list[tuple[float, float, float, str, str]]:

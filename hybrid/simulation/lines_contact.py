@@ -154,12 +154,10 @@ class SelfWatch:
         ends = self._touches and bool(model.line.bits & MAY_TOUCH)
         self.itself.ahead.asked = 1.0 if self.asks else WIDER if ends else -1.0
 
-    def begins(self, t: float, model: Model, event: Callable[..., None] | None) -> None:
-        """Contact is computed from now on; event: as of `tell`, None where nobody is told."""
+    def begins(self, t: float, model: Model, event: Callable[..., None]) -> None:
+        """Contact is computed from now on, which an event says."""
         found = self.itself.found
         found.away = 0.0
-        if event is None:
-            return
         s, other, where = float(model.line.s[0]), float(model.line.s[-1]), "parts of the line"
         if math.isfinite(found.distance):
             s, other = sorted((float(found.s), float(found.other_s)))

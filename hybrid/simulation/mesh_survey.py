@@ -99,12 +99,6 @@ def lack_along(scene: LineScene, survey: Survey) -> Floats:
     return survey.lack_along(asked) if asked is not None else np.zeros(survey.demand.s.size)
 
 
-def asks_along(scene: LineScene) -> bool:
-    """Whether curvature, moment or tension along the line is asked."""
-    asked = requested_accuracy(scene)
-    return asked is not None and asked.along
-
-
 def bending_asked(scene: LineScene, s: Floats, curvature: Floats) -> float:
     """Error of curvature that is asked, as a part of the largest; infinite where none is.
 
@@ -150,7 +144,8 @@ class Survey:
         demand = Demand(s, sharp, (curvature / low).max(axis=0), *ends)
         bends = bending_asked(scene, s, sharp)
         reach = reach_of(run["position"])
-        return cls(model, demand, given, asks_along(scene) or bends <= ROUGHEST, reach, bends)
+        along = (asked := requested_accuracy(scene)) is not None and asked.along
+        return cls(model, demand, given, along or bends <= ROUGHEST, reach, bends)
 
     def _layers(self, rod: np.ndarray, joints: Sequence[float]) -> Floats:
         """Cells (SAMPLES,) 1/m beside what disturbs rods; rod: (K,) where the line is one; joints: m."""
@@ -386,7 +381,8 @@ def _unfolded(
             lines = tried.lines.items()
             tried = NetworkResolution({k: x.coarser(cells=0.5) if k in wanted else x for k, x in lines})
             continue
-        found, finer = tried, _graded(tried, {name: _unfolding(scenes[name], *rest[name]) for name in wanted})
+        folded = [name for name in wanted if float(_turns(*rest[name]).max()) > MOST_FOLD]
+        found, finer = tried, _graded(tried, {name: grading_of(scenes[name], *rest[name]) for name in folded})
         if finer is tried:
             return tried
         tried = finer
@@ -415,11 +411,6 @@ def rods_at_rest(network: Network, resolution: NetworkResolution, moves: bool) -
         if not (moves and network.starts_as_placed):
             states = equilibrium_of(network, model, 0.0 if moves else np.inf).state.lines
     return dict(zip(model.names, zip(model.models, states, strict=True), strict=True))
-
-
-def _unfolding(scene: LineScene, model: Model, state: State) -> Grading | None:
-    """The cells that show the bends of a state, where a rod folds from one cell to the next; None: none does."""
-    return grading_of(scene, model, state) if float(_turns(model, state).max()) > MOST_FOLD else None
 
 
 def _is_open(scene: LineScene, resolution: Resolution) -> bool:

@@ -249,8 +249,6 @@ class OwnParts(Part):
             error.add_note(f"raised by {verb} of the part {part.name} at t = {self._run.t:.6g} s")
             raise
 
-    is_of_form = False  # what they keep may grow
-
     def checkpoint(self) -> dict[str, Any]:
         """What they know, and what they knew before the run, by name."""
         kept = {x.name: {"given": self._given[x.name], "now": x.checkpoint()} for x, _ in self._each}

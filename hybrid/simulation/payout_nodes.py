@@ -84,8 +84,7 @@ class NodeChanges(Remesh):
 
     def _reel(self, k: int, cells: int) -> Reel:
         now = self._paying.reel
-        found: Reel = self._reels[k].view(cells, **{name: getattr(now, name) for name in SHARED})
-        return found
+        return self._reels[k].view(cells, **{name: getattr(now, name) for name in SHARED})
 
     def _beside_table(self) -> tuple[Table, Callable[[], Any]]:
         return self._paying.table, blank_reel_job

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
-from hybrid.kernels.contact.lines_distance import ROOM, WATCHED
 from hybrid.kernels.contact.self_distance import Itself, blank_itself, blank_itself_job, boxes_of
 from hybrid.kernels.machine.binding import Packed, Room, Table, address
 from hybrid.kernels.mesh import remesh as f
@@ -166,12 +165,7 @@ def blank_kept(n: int, extra: int) -> Books:
     return b.blank_books(n)._replace(strains=strains, extremes=extremes)
 
 
-def blank_pushes(n: int) -> Pushes:
-    """Room for the pushes of n cells."""
-    return Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4)))
-
-
-of_pushes = Packed(blank_pushes)
+of_pushes = Packed(lambda n: Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4))))
 
 
 @cache
@@ -351,34 +345,28 @@ class Remesh:
     def line(self, k: int, cells: int) -> Line:
         """The line of side k."""
         line = self.model.line
-        found: Line = self._lines[k].view(cells, bits=line.bits, plane=line.plane, **NO_LAWS)
-        return found
+        return self._lines[k].view(cells, bits=line.bits, plane=line.plane, **NO_LAWS)
 
     def state(self, k: int, which: int, cells: int) -> State:
         """The state of side k of even (which = 0) or odd parity (1)."""
-        found: State = self._states[k][which].view(cells, **self._memory)
-        return found
+        return self._states[k][which].view(cells, **self._memory)
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
         if not self.pushes[0].size:
             return NO_PUSH
-        found: Floats = self._pushes[k].view(cells)[which]
-        return found
+        return self._pushes[k].view(cells)[which]
 
     def _sea_on(self, cells: int) -> Sea:
         values = self.model.sea.values
-        found: Sea = self._sea.view(cells, **{x: getattr(values, x) for x in REST_OF_SEA})
-        return found
+        return self._sea.view(cells, **{x: getattr(values, x) for x in REST_OF_SEA})
 
     def _work_on(self, cells: int) -> Work:
-        found: Work = self._work.view(cells, torsion=self._solver.work[self._number].torsion)
-        return found
+        return self._work.view(cells, torsion=self._solver.work[self._number].torsion)
 
     def _books(self, k: int, cells: int) -> Books:
         given = {name: getattr(self._line.books, name) for name in REST_OF_BOOKS} | {"base": self._base}
-        found: Books = self._kept[k].view(cells, **given)
-        return found
+        return self._kept[k].view(cells, **given)
 
     def _width(self, cells: int) -> Floats:
         """Diameters of cells; none where nobody watches whether the line meets itself or others."""
@@ -411,17 +399,7 @@ class Remesh:
         change, parts, at.begun = self._tables_of_change()
         (due, plan, keep), planners, at.room = self._planner()
         in_run, in_beside = of_run[0].places(IN_RUN), of_beside[0].places(self.beside)
-        numbers: dict[str, Any] = {
-            "itself": np.zeros(0, np.int64),
-            "itself_places": np.zeros(0, np.int64),
-            "in_itself": np.zeros((2, 3, 0), np.int64),
-            "even_joined": np.zeros(0, np.int64),
-            "odd_joined": np.zeros(0, np.int64),
-            "pairs": np.zeros((0, WATCHED), np.int64),
-            "room": np.zeros((0, ROOM)),
-        }
-        if self._watch is not None:
-            numbers |= self._watch.distances
+        numbers = dict[str, Any]() if self._watch is None else self._watch.distances
         if len(self._pairs) > 1:
             numbers |= dict(zip(("even_joined", "odd_joined"), (x.numbers for x in self._pairs[1]), strict=True))
         of_itself: list[Shaped] = []

@@ -264,13 +264,8 @@ def resolution_from(tree: Any, scene: LineScene) -> Resolution:
         (tree,) = tree.values()  # by the name of the only line
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
-    later = {
-        "bends": inf,
-        "rods": np.zeros(0),
-        "parts": 1,
-        "places": np.zeros(0),
-        "ends": np.zeros(0),
-    }  # all cells of before had one part
+    # all cells of before had one part
+    later = {"bends": inf, "parts": 1, "rods": np.zeros(0), "places": np.zeros(0), "ends": np.zeros(0)}
     tree = {name: x for name, x in tree.items() if name != "follow"}  # of checkpoints of 1.0
     saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
@@ -294,12 +289,8 @@ def resolution_from(tree: Any, scene: LineScene) -> Resolution:
     rods = saved["rods"]
     if rods.size % 3 or not np.isfinite(rods).all() or not (rods[::3] <= rods[1::3]).all():
         raise ValueError("stretches that no line has")
-    rods = rods.reshape(-1, 3)
-    rows = {
-        "rods": tuple((float(a), float(b), float(x)) for a, b, x in rods),
-        "places": tuple(saved["places"].tolist()),
-        "ends": tuple(saved["ends"].tolist()),
-    }
+    rows = {x: tuple(saved[x].tolist()) for x in ("places", "ends")}
+    rows["rods"] = tuple(map(tuple, rods.reshape(-1, 3).tolist()))
     return Resolution(**saved | {"grading": grading} | rows)
 
 

@@ -488,10 +488,7 @@ class Envelope:
             if np.isfinite(now[:, row]).all():  # else no state was computed yet
                 for bound, better in ((0, np.less), (1, np.greater)):
                     found = better(now[bound, row], some[bound, row])
-                    some[bound, row][found], some[2 + bound, row][found] = (
-                        now[bound, row][found],
-                        now[2 + bound, row][found],
-                    )
+                    some[bound::2, row][:, found] = now[bound::2, row][:, found]  # with its time
         return out
 
     # --- checkpoints --------------------------------------------------------------------------------

@@ -458,7 +458,10 @@ def new_run(
     end = (recording.until or network.require_time().duration) if moves else 0.0
     changes = [replace(x, scene=with_loads_of(network, x.scene)) for x in changes if x.t < end]
     if recording.source is None:
-        first = _at_start(network, resolution, recording.start, moves, criterion)
+        start = recording.start
+        if start is None:
+            start = start_of(network, build_network(network, resolution=resolution), moves, criterion)
+        first = _at_start(network, start)
     else:
         first = _at_checkpoint(network, recording.source, changes, criterion)
     kept = recording.mode.before is not None and isinstance(target, Path)
@@ -469,16 +472,8 @@ def new_run(
     return run
 
 
-def _at_start(
-    network: Network,
-    resolution: NetworkResolution | None,
-    start: Start | None,
-    moves: bool,
-    criterion: UserCriterion | None,
-) -> First:
-    """The equilibrium of a network, or its lines as they are placed, unless its start is known."""
-    if start is None:
-        start = start_of(network, build_network(network, resolution=resolution), moves, criterion)
+def _at_start(network: Network, start: Start) -> First:
+    """The equilibrium of a network, or its lines as they are placed."""
     state = NetworkState([x.start for x in start.model.models], start.model.body_places)
     state = (state if start.found is None else start.found.state).copy()
     scenes = network.scenes_of_lines

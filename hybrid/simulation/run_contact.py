@@ -147,7 +147,7 @@ class RunContact(Part):
         if self.watch.is_needed:
             run.loop.watch(*self.watch.attach(run.solver.line_tables))
         else:
-            run.loop.watch_nothing()  # its tables are of the watch before, which is gone
+            run.loop.watch()  # its tables are of the watch before, which is gone
         for line in run.lines:
             line.watched_by = self.watch
 
@@ -177,7 +177,7 @@ class RunContact(Part):
             refuse_within_itself(run.model, run.solver.lines, run.state, True)
         step = run.resolution.one.step
         for line, state in zip(run.lines, run.state.lines, strict=True):
-            line.nears_itself = line.is_near_itself(run.t, state, step)
+            line.nears_itself = line.envelope.itself.is_near(run.t, state, step)
         self._begin_alone()
 
     def begin(self) -> None:
@@ -241,14 +241,13 @@ class RunContact(Part):
         near = [line for line in run.lines if line.nears_itself]
         begun = []
         for line in near:
-            line.has_neared_itself = True
+            line.has_neared_itself, line.nears_itself, watch = True, False, line.envelope.itself
             if not line.lets_touch:
-                line.watch_itself_no_more(run.solver)
+                watch.on = False
+                run.solver.bind_line(line.number, itself=0)
                 continue
-            x, line.nears_itself = run.solver.lines[line.number], False
-            model = run.model.models[line.number]
+            x, model = run.solver.lines[line.number], run.model.models[line.number]
             energy = contact_of(model).energy_of(x.line, x.ends, run.state.lines[line.number])
-            watch = line.envelope.itself
             if math.isfinite(energy):
                 begun.append(line.number)
                 watch.begins(run.t, model, line.events.event)

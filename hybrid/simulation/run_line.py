@@ -183,7 +183,8 @@ class RunLine:
         self.recorder: Rows | ComparisonRecorder
         record = wanted.record
         self.recorder = ComparisonRecorder(FORCE_COLUMNS) if record is None else record(self, found, outputs)
-        self.books = self._own_books(state)
+        self.envelope.count_from(model, state.r)
+        self.books = self._blank_books(state.r)
         if self.envelope.quantities:
             self.books = self.envelope.quantities.given_to(self.books)
         self._touching = model  # for whose cells that is
@@ -192,13 +193,11 @@ class RunLine:
         self._aside: list[tuple[Model, Output]] = []  # that wait, each of a line of its own
         self._log: list[Floats] = []
 
-    def _own_books(self, state: State) -> Books:
-        """Books that keep the extremes of all steps; displacements count from a state."""
-        self.envelope.count_from(self.model, state.r)
-        return self._blank_books(state.r)
-
     def _blank_books(self, begin: Floats) -> Books:
-        """The same for the cells of now; begin: (N+1, 3) m, from where displacements count."""
+        """Books that keep the extremes of all steps, for the cells of now.
+
+        begin: (N+1, 3) m, from where displacements count.
+        """
         line, marks = self.model.line, marks_on(self.model.line.s, self.marked)
         nodes, marked = line.s.size, np.flatnonzero(marks)
         right = np.arange(nodes)
@@ -306,10 +305,6 @@ class RunLine:
         if self.envelope.itself.check(t or 0.0, state, self.events.event) & NEARS:
             self.meets_itself(t or 0.0, 0.0)
 
-    def is_near_itself(self, t: float, state: State, step: float) -> bool:
-        """Whether contact that may begin has to at the state at t (s), from which steps (s) are to be made."""
-        return self.envelope.itself.is_near(t, state, step)
-
     def meets_itself(self, t: float, dt: float) -> None:
         """An event, unless there was one, where contact could not begin after the step of dt (s) to t (s)."""
         self.envelope.itself.report_meeting(t, dt, self.events.event)
@@ -346,10 +341,8 @@ class RunLine:
         was, before = self.model, self.books
         self.use_model(model, other_cells=True)
         names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
-        same, blank = (
-            {name: getattr(before, name) for name in names},
-            self._blank_books(self.envelope.start_of(model.nodes)),
-        )
+        same = {name: getattr(before, name) for name in names}
+        blank = self._blank_books(self.envelope.start_of(model.nodes))
         before.clock.wave_step = blank.clock.wave_step
         self.books = blank._replace(**same)
         self.books.work[:], self.books.power[:] = before.work, before.power
@@ -388,11 +381,6 @@ class RunLine:
         hides = bool(found & HIDES) and not self.lets_touch
         found = self.envelope.itself.judge(found, t, dt, state, self.events.event) | (NEARS if hides else 0)
         self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
-
-    def watch_itself_no_more(self, solver: NetworkSolver) -> None:
-        """Do not look any longer how near the line comes to itself."""
-        self.nears_itself = self.envelope.itself.on = False
-        solver.bind_line(self.number, itself=0)
 
     def watch(self, step: LineStep) -> None:
         """Look at what a step has flagged; the stretch of a run to compare with is not its matter.

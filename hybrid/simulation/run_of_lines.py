@@ -192,9 +192,7 @@ class RunOfLines:
 
     def adopt_cells(self, number: int, model: Model, work: Work) -> None:
         """Go on with other cells of a line, which steps have changed to."""
-        models, line = [*self.model.models], self.lines[number]
-        models[number] = model
-        self.model = replace(self.model, models=tuple(models))
+        line, self.model = self.lines[number], self.model.with_lines({number: model})
         self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
         line.adopt_cells(model)
         for part in self.parts:
@@ -272,13 +270,12 @@ class RunOfLines:
 
     def change_lines(self, changes: Mapping[int, Callable[[Line], Line]]) -> None:
         """These lines, by number, are changed so on the same cells; the solver has still to follow."""
-        models = [*self.model.models]
+        models = {k: replace(x := self.model.models[k], line=change(x.line)) for k, change in changes.items()}
         for k, change in changes.items():
-            models[k] = replace(models[k], line=change(models[k].line))
             self.lines[k].use_model(models[k])
             for part in self.parts:
                 part.change_line(k, change)
-        self.model = replace(self.model, models=tuple(models))
+        self.model = self.model.with_lines(models)
 
     def go_on_changed(self, numbers: Iterable[int], after: str) -> None:
         """Another solver, for lines of these numbers that have changed, and that share contact with those.

@@ -151,15 +151,6 @@ class PaidZones:
         change_base(manager, model, source, cells, given, anew)
         self.switching.set_cells(model)
 
-    def moving(self) -> MovingZones:
-        """What the kernels of payout know of them."""
-        return MovingZones(self.switching.zones.lengths, self.switching.zones.stiff)
-
-
-def moving_zones(zones: PaidZones | None) -> MovingZones:
-    """The same of any line."""
-    return zones.moving() if zones is not None else zones_that_stay()
-
 
 class RunPayout(Part):
     """The lengths of all lines of a run that are paid out."""
@@ -171,7 +162,8 @@ class RunPayout(Part):
         self._run = run
         self.zones: dict[int, PaidZones] = {}  # of those whose zones move
         self.lines = {k: PayingOut(x) for k, x in enumerate(run.model.models) if x.payout is not None}
-        self._use_models({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
+        each = ((k, x, run.model.models[k]) for k, x in self.lines.items())
+        run.model = run.model.with_lines({k: x.on(model, model.length) for k, x, model in each})
         for k, x in self.lines.items():  # vortices begin once round along the line
             wake = run.state.lines[k].wake
             wake[:, PHASE] = 2.0 * np.pi * run.model.models[k].line.s[: len(wake)] / x.plan.first
@@ -179,11 +171,6 @@ class RunPayout(Part):
         for row, x in zip(self._rows, self.lines.values(), strict=True):
             x.table.move(row)
         self._nodes: dict[int, NodeChanges] = {}  # what lets nodes enter and leave without Python
-
-    def _use_models(self, models: Mapping[int, Model]) -> None:
-        run = self._run
-        found = tuple(models.get(k, x) for k, x in enumerate(run.model.models))
-        run.model = replace(run.model, models=found)
 
     @property
     def remeshes(self) -> bool:
@@ -212,7 +199,8 @@ class RunPayout(Part):
         """What changes the length of a line, whose state of now is that before a step and after it."""
         run, paying, x = self._run, self.lines[k], solver.lines[k]
         books, work, state = run.lines[k].books, solver.work[k], run.state.lines[k]
-        moving = moving_zones(self.zones.get(k))
+        zones = self.zones[k].switching.zones if k in self.zones else None
+        moving = zones_that_stay() if zones is None else MovingZones(zones.lengths, zones.stiff)
         given = run.loop.clock, run.loop.counts, books.work, books.velocity, work.report, paying.reel
         job = ReelJob(x.line, x.sea, x.ends, state, state, *given, work.X, work.W, moving)
         return job._asdict()
@@ -309,7 +297,7 @@ class RunPayout(Part):
         if line.contact is not None or line.shares:  # whose forces kernels.reel.paid_length does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked
-        self._use_models({k: model})
+        run.model = run.model.with_lines({k: model})
         run.state = NetworkState(states, run.state.bodies)
         line.use_cells(model)
 
@@ -330,10 +318,9 @@ class RunPayout(Part):
 
     def fit_models(self, model: NetworkModel) -> NetworkModel:
         """A model with other loads on the cells of t = 0, with the cells of now."""
-        found = [*model.models]
-        for k, x in self.lines.items():
-            found[k] = x.on(replace(found[k], layout=self._run.model.models[k].layout), x.length)
-        return replace(model, models=tuple(found))
+        now = self._run.model.models
+        found = {k: x.on(replace(model.models[k], layout=now[k].layout), x.length) for k, x in self.lines.items()}
+        return model.with_lines(found)
 
     # --- checkpoints ------------------------------------------------------------------------------
 
@@ -348,7 +335,7 @@ class RunPayout(Part):
             model = x.restore(saved[run.lines[k].name], run.model.models[k])
             if k in self.zones:
                 self.zones[k].resume(model)
-            self._use_models({k: model})
+            run.model = run.model.with_lines({k: model})
             states[k] = state_for(model.line)
             run.lines[k].use_cells(model, extremes=False)
         run.state = NetworkState(states, run.state.bodies)

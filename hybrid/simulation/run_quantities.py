@@ -29,7 +29,7 @@ from hybrid.outputs.quantities import Quantities, StepQuantities
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.ends import Fairlead, FreePoint, GuidedPoint, Point
 from hybrid.scene.network import Network
-from hybrid.scene.quantities import KINDS, Quantity
+from hybrid.scene.quantities import KINDS
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.parts import Part, Sampled, times
@@ -295,23 +295,15 @@ def listed_outputs(scene: SceneLike) -> list[Listed]:
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
         fields = observer_of(each, built, moves).fields
         found += _over_time(fields, steps=moves, begin=group_of(name))
-    return _with_ranges(found, asked.output.quantities) if moves else found
+    told = {*asked.output.quantities, "wall_tension", "von_mises"} if moves else ()
+    every = "; extremes and limits: of every step"
+    return [x._replace(description=x.description + every) if x.name in told else x for x in found]
 
 
 def kinds_of_quantities() -> list[Listed]:
     """Kinds of `output.quantities`, which are recorded where a scene asks for them."""
     words = {"end": "end given", "to": "touchdown point or other end", "what": "a point, a plane, a path or a line"}
     return [Listed(kind, unit, ("t",), text.format(**words)) for kind, (unit, text, _, _) in KINDS.items()]
-
-
-def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity]) -> list[Listed]:
-    """Listed quantities that say whether extremes and limits of them are those of every step; asked: by name."""
-    out = []
-    for x in found:
-        if x.name in asked or x.name in ("wall_tension", "von_mises"):
-            x = x._replace(description=f"{x.description}; extremes and limits: of every step")
-        out.append(x)
-    return out
 
 
 def _over_time(fields: Iterable[Field], steps: bool = False, begin: str = "") -> list[Listed]:

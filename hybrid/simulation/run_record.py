@@ -355,12 +355,10 @@ class RecordedRun(RunOfLines):
     def finish(self, status: str = "complete", message: str = "") -> None:
         """Write what waits, and close the file."""
         self.write_log()
+        let_go = () if status == "complete" else (LineFailed,)
         for write in (self.record_samples, *(line.write_down for line in self.lines)):
-            if status == "complete":
+            with suppress(*let_go):
                 write()
-            else:
-                with suppress(LineFailed):
-                    write()
         if status != "failed":
             self.keep(last=True)
         self._close(status, message or f"{self.steps} steps")

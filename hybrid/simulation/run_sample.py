@@ -243,16 +243,8 @@ def restored_sample(
     if min(saved["cells"], saved["steps"], saved["every"]) < 1:
         raise ValueError("a run without cells, steps or outputs")
     shape = (every_of(shape[0], saved["every"]).size, *shape[1:])
-    return RunSample(
-        **saved
-        | {
-            "resolution": resolution,
-            "notes": restored_notes(saved["notes"]),
-            "values": restored_outputs(saved["values"], shape),
-            "model_error": restored_outputs(saved["model_error"], shape),
-            "at_edges": restored_outputs(saved["at_edges"], shape),
-        }
-    )
+    outputs = {x: restored_outputs(saved[x], shape) for x in ("values", "model_error", "at_edges")}
+    return RunSample(**saved | outputs | {"resolution": resolution, "notes": restored_notes(saved["notes"])})
 
 
 def restored_notes(tree: Any) -> Notes:

@@ -20,6 +20,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import DONE, SPRING, W
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.zone_torque import TURN, torsion_energy
+from hybrid.kernels.run.network_run import CUT_LINE, SLACK_LINE, TURNED_LINE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FORCE_A
@@ -358,7 +359,7 @@ class Cuts(Part):
         """An end turns too far in a fixed step, which was cut."""
         loop, clock = self._run.loop, self._run.loop.clock
         if not loop.controlled:
-            line, angle, step = self._run.lines[loop.turned_line], float(clock.cut_angle), float(clock.cut_step)
+            line, angle, step = self._run.lines[loop.lines[TURNED_LINE]], float(clock.cut_angle), float(clock.cut_step)
             text = (
                 f"an end turns by {angle:.3g} rad in a step of {step:.4g} s: this step and others like it are cut, so "
                 f"that it turns by at most {clock.most_turn:g} rad in each and no turn is lost; time.step: "
@@ -370,7 +371,7 @@ class Cuts(Part):
     def _note_slack(self) -> None:
         """A catenary was slack in a step that is too long for its waves, and not in shorter ones."""
         loop, clock = self._run.loop, self._run.loop.clock
-        line, taken = self._run.lines[loop.slack_line], float(clock.last_dt)
+        line, taken = self._run.lines[loop.lines[SLACK_LINE]], float(clock.last_dt)
         s = float(line.model.line.s[int(loop.counts.slack_cell)])
         text = (
             f"a catenary loses its tension here in a step of {clock.slack_step:.4g} s, and keeps it in one of "
@@ -406,7 +407,7 @@ class Cuts(Part):
     def _note_collapse(self) -> None:
         """Steps have become so short that the run may not end: an event; one to be compared with stops."""
         run, count = self._run, self._run.loop.counts
-        number, where = run.loop.last_cut
+        number, where = int(run.loop.lines[CUT_LINE]), int(count.cut_at)
         line, tiny = run.lines[max(number, 0)], int(count.tiny_steps)
         s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
         text = (

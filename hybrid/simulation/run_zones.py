@@ -255,19 +255,19 @@ class RunZones(Part):
         Contact with itself is that of the model of the run.
         """
         run = self._run
-        models, states = [*run.model.models], [*run.state.lines]
+        models, states = dict[int, Model](), [*run.state.lines]
         for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
             k, layout, manager = x.number, x.full.zoned, x.switching.manager
             mine = matched(
                 saved["zones"][run.lines[k].name], {"rod": layout.rod, "here": None, "switching": None}, "zones"
             )
-            model = on_layout(models[k], _saved_layout(layout, mine))
+            model = on_layout(run.model.models[k], _saved_layout(layout, mine))
             manager.set_layout(model.zoned)
             x.switching, x.pending = ZoneSwitching(model, manager), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
             run.lines[k].use_cells(model, extremes=False)
-        run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
+        run.model, run.state = run.model.with_lines(models), run.state._replace(lines=states)
         return True
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -349,9 +349,7 @@ class RunZones(Part):
         run, k = self._run, x.number
         run.lines[k].books.work[0, b.ZONES] += booked
         note_change(run.lines[k].events, x.switching.manager, run.t, change, booked)
-        models = [*run.model.models]
-        models[k] = model
-        run.model = replace(run.model, models=tuple(models))
+        run.model = run.model.with_lines({k: model})
 
     def switch_zones(self, number: int, change: Change, here: np.ndarray | None) -> None:
         """Give a line other zones, whose solver has still to follow; here: as of `ZoneSwitching.switch`."""

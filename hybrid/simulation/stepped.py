@@ -233,11 +233,6 @@ class SettableObstacles:
             raise ValueError(f"name: expected {_one_of(known)} that has from_outside, found {name!r:.60}")
         return found
 
-    def _move_obstacles(self, now: float, until: float, one_step: bool) -> None:
-        """Those that have been set are on their way from `now` to `until` (s); one_step: whether in one step."""
-        for name in self._moved:
-            set_out(self._obstacle_paths(name), self._courses.pop(name, None), now, until, one_step)
-
 
 def _one_of(names: Any) -> str:
     return f"an obstacle of the scene ({', '.join(names) or 'there is none'})"

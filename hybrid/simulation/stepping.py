@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import SceneError
 from hybrid.model.ends import DrivenEnd, contradictions
 from hybrid.model.network import NetworkResolution
 from hybrid.scene.analysis import missing_time
@@ -211,8 +211,8 @@ class Simulation(SteppedPoints):
         one_step = until - now <= ONE_STEP * (self._fixed_step or self._run.last_step)
         for name, ends in self._driven.items():
             set_out(ends, self._next.pop(name, None), now, until, one_step)
-        if self._moved:
-            self._move_obstacles(now, until, one_step)
+        for name in self._moved:
+            set_out(self._obstacle_paths(name), self._courses.pop(name, None), now, until, one_step)
 
     def _go_to(self, until: float) -> None:
         stops, sliver = self._stops, self._sliver
@@ -293,12 +293,6 @@ class Simulation(SteppedPoints):
 
     # --- the end ----------------------------------------------------------------------------------
 
-    def _end_with(self, failed: LineFailed) -> ComputationError:
-        """Close the file of what has failed."""
-        error = self._error_of(failed)
-        self._run.finish_failed(failed, str(error))
-        return error
-
     @property
     def closed(self) -> bool:
         """Whether the simulation is over, and its result written."""
@@ -326,7 +320,9 @@ class Simulation(SteppedPoints):
             try:
                 self._run.finish(status, message)
             except LineFailed as late:  # an output says that going on makes no sense
-                raise self._end_with(late) from None
+                error = self._error_of(late)
+                self._run.finish_failed(late, str(error))
+                raise error from None
 
     def __enter__(self) -> Simulation:
         return self

@@ -7,6 +7,7 @@ too.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -516,13 +517,6 @@ def core_of_knot(r: Floats) -> tuple[int, int]:
     def knotted(a: int, b: int) -> bool:
         return len(drawn_straight(r[a : b + 1])) > FEWEST
 
-    first, last = 0, len(r) - 1
-    low, high = 0, last
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if knotted(middle, last) else (low, middle)
-    first, low, high = low, low, last
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if knotted(first, middle) else (middle, high)
-    return first, high
+    last = len(r) - 1
+    first = bisect_left(range(1, last), True, key=lambda a: not knotted(a, last))
+    return first, bisect_left(range(last), True, first + 1, key=lambda b: knotted(first, b))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +52,7 @@ def equilibrium_on_cells(
     fewer = {k: x for k, x in managers.items() if _may_have_fewer(model, k, x)}
     if fewer:
         try:
-            few = _with(model, {k: with_fewer_cells(model.models[k]) for k in fewer})
+            few = model.with_lines({k: with_fewer_cells(model.models[k]) for k in fewer})
             found = equilibrium_of(network, few, t)
             if not found.settled:
                 model, found = _on_planned_cells(few, found, fewer, t)
@@ -70,11 +69,6 @@ def _may_have_fewer(model: NetworkModel, k: int, manager: DomainManager) -> bool
     return bool((manager.given >= 0).all()) and not bound
 
 
-def _with(model: NetworkModel, others: Mapping[int, Model]) -> NetworkModel:
-    """The same network with other models of some lines, by number."""
-    return replace(model, models=tuple(others.get(k, x) for k, x in enumerate(model.models)))
-
-
 def _on_planned_cells(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, DomainManager], t: float) -> Rest:
     """The equilibrium with cells as its curvature asks for, from one with others.  ComputationError: there is none."""
     before = {k: planned_cells(model.models[k], x, found.state.lines[k], t) for k, x in managers.items()}
@@ -84,7 +78,7 @@ def _on_planned_cells(model: NetworkModel, found: LinesAtRest, managers: Mapping
             old = model.models[k]
             others[k] = on_layout(old, old.zoned._replace(here=here))
             states[k] = refined(states[k], old.line, others[k].line)
-        model = _with(model, others)
+        model = model.with_lines(others)
         start = NetworkState(states, found.state.bodies)
         found = solve_from(found, model, t, found.bodies, start, "the equilibrium of other cells")
         wanted = {k: planned_cells(model.models[k], x, found.state.lines[k], t) for k, x in managers.items()}
@@ -172,12 +166,12 @@ def _most_rod(model: NetworkModel, found: LinesAtRest, managers: Mapping[int, Do
 
 def _with_rods(model: NetworkModel, found: LinesAtRest, rods: Mapping[int, np.ndarray], t: float) -> Rest:
     """Lines of which these base cells are rod, by their numbers, at rest, from lines that are all rod."""
-    models, states = [*model.models], [*found.state.lines]
+    models, states = dict[int, Model](), [*found.state.lines]
     for k, rod in rods.items():
         full = model.models[k]
         models[k] = on_layout(full, full.zoned._replace(rod=rod))
         states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at_time(t))
-    other, start = replace(model, models=tuple(models)), NetworkState(states, found.state.bodies)
+    other, start = model.with_lines(models), NetworkState(states, found.state.bodies)
     return other, solve_from(found, other, t, found.bodies, start, "the equilibrium of rods")
 
 
@@ -185,10 +179,9 @@ def zones_as_placed(
     scenes: Mapping[str, LineScene], model: NetworkModel, criterion: UserCriterion | None
 ) -> tuple[NetworkModel, dict[int, DomainManager]]:
     """Zones of a start that is no equilibrium, as of one cable: rod, but for what a line wants to be catenary."""
-    managers, models = managers_for(scenes, model, criterion), [*model.models]
-    for k, manager in managers.items():
-        models[k] = zones_without_equilibrium(models[k], manager)
-    return replace(model, models=tuple(models)), managers
+    managers = managers_for(scenes, model, criterion)
+    models = {k: zones_without_equilibrium(model.models[k], manager) for k, manager in managers.items()}
+    return model.with_lines(models), managers
 
 
 def _within(

@@ -232,8 +232,7 @@ class SelfContact(ContactBooks):
     def energy(self) -> float:
         """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
         self.call[ASKED] = REST
-        energy: float = contact_task(self._table)
-        return energy
+        return contact_task(self._table)
 
     def energy_of(self, line: Line, ends: Ends, state: State) -> float:
         """Energy, J, of contact of a state at rest; 0: nothing touches; infinite: parts are in each other."""
@@ -241,7 +240,7 @@ class SelfContact(ContactBooks):
         self.attach(line, ends, (state, state.copy()), workspace_of(line, keep=True), books)
         return self.energy()
 
-    def count_energy(self, state: State, ends: Ends, report: Floats) -> float:
+    def count_energy(self, state: State, ends: Ends, report: Floats) -> None:
         """Energy, J, of contact of the state of a run, on other cells now: what travels store counts from here.
 
         It goes into the report of the state, and what contact does to ends that are held into their forces.
@@ -250,7 +249,6 @@ class SelfContact(ContactBooks):
         force, energy = self.force(state), self.energy()
         self.contact.numbers.stored = self.contact.numbers.tried
         count_in(report, energy, force, ends)
-        return energy
 
     @property
     def deepest(self) -> tuple[int, int]:

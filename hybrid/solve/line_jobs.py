@@ -77,7 +77,8 @@ class Rooms(NamedTuple):
 
     whole: Values  # of a kernels.junctions.borders.NetworkJob
     rows: Values  # likewise, with a row for each line of the network
-    borders: dict[str, Callable[[Sequence[int]], Values | None]]  # of borders by name, for lines; None: they have none
+    # Of borders by name, the same for all lines, or what gives that of some; None: they have none.
+    borders: dict[str, Values | Callable[[Sequence[int]], Values | None]]
 
 
 class JointJobs:
@@ -105,7 +106,8 @@ class JointJobs:
         """Take the borders that there are in the rooms now."""
         self._borders.clear()
         for name, border in BORDERS.items():
-            own = self._rooms.borders[name](self._lines) if name in self._rooms.borders else None
+            room = self._rooms.borders.get(name)
+            own = room(self._lines) if callable(room) else room
             if own is not None:
                 tables = Table(border.blank), Table(border.blank)
                 for job, table in zip(self.jobs, tables, strict=True):
@@ -211,16 +213,6 @@ def room_to_touch(nodes: int, bodies: int, rests: NDArray[np.int64]) -> Values:
 # --- tables of lines ---------------------------------------------------------------------------
 
 
-def _always(room: dict[str, Any]) -> Callable[[Sequence[int]], dict[str, Any]]:
-    """Room of a border that all groups of lines have."""
-    return lambda _: room
-
-
-def _torques_of(twists: Sequence[bool]) -> Callable[[Sequence[int]], dict[str, Any] | None]:
-    """Room of the border of torques, which lines through whose zones they pass have."""
-    return lambda lines: {} if any(twists[k] for k in lines) else None
-
-
 Lines = Sequence[JoinedLine]
 SelfContacts = Sequence[SelfContact | None]
 
@@ -313,7 +305,7 @@ class LineJobs:
         carried = [most if is_answered_again(x) else 0 for x, most in zip(lines, self._most_nodes, strict=True)]
         joints = room_of_joints(lines, carried, points, bodies)
         joints |= {"net": self.net, "work": self.body_work}
-        borders: dict[str, Any] = {"joints": {}}
+        borders, twists = dict[str, Any](joints={}), self._twists  # which change in place
         if self._rides.size:
             borders["shapes"] = self._pressed
         if self._winches:
@@ -328,9 +320,8 @@ class LineJobs:
         rows |= {"gaps": self._gaps, "still": np.zeros_like(self._gaps)}
         whole = joints | {"near": self._near, "alone": self._alone, "asked": self._asked, "rides": self._rides}
         whole |= {"phase": self._phase, "marks": np.zeros(nodes, np.int64)}
-        return Rooms(
-            whole, rows, {name: _always(x) for name, x in borders.items()} | {"torques": _torques_of(self._twists)}
-        )
+        borders["torques"] = lambda lines: {} if any(twists[k] for k in lines) else None
+        return Rooms(whole, rows, borders)
 
     def bind_line(self, number: int, **values: Any) -> None:
         """Put values in their places in the jobs of a line."""
@@ -587,16 +578,12 @@ class LineJobs:
             table.bind(task=Task(RUN, limits=self.limits_by_itself(k)), **states)
             self._bind_pushes(k)
         numbers, mixes = self._all.jobs[0].numbers, any(self._mixes)
-        together, marchers = self._together.jobs, np.array(self._marchers(), np.int64)
+        together, marchers = self._together.jobs, np.array([self.marcher_of(k) for k in self.lone], np.int64)
         found: dict[str, Any] = {"even": numbers, "odd": self._all.jobs[1].numbers, "marchers": marchers}
         found |= {"joined_even": together[0].numbers, "joined_odd": together[1].numbers, "lone": self.lone_numbers}
         found |= {"joined": np.array(self.joined, np.int64), "lone_lines": np.array(self.lone, np.int64)}
         finder, leader = (x.address(numbers) if mixes else 0 for x in (find_near, lead_lone))
         return found | {"finder": finder, "leader": leader}
-
-    def _marchers(self) -> list[int]:
-        """Addresses of the kernels that solve steps of the lines that are solved by themselves."""
-        return [self.marcher_of(k) for k in self.lone]
 
     def carry(self, number: int, pushes: list[Floats]) -> None:
         """Carry a push out of its plane along with a line: (N+1, 4) of states of even parity, and of odd."""

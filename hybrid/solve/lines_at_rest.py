@@ -187,11 +187,13 @@ def lines_at_rest(
     def search(group: Group, quick: bool) -> LinesAtRest:
         smooth, tally = group.solver(slackens=not quick), Tally()
         begun, more = ([(name, group.begun(state)) for name, state in x] for x in ([(name, first)], others))
-        roads = [attempts(smooth, begun if quick else chain(begun, _begun(group, starts)), more, tally)]
+        later = ((name, group.begun(state)) for name, state in starts)
+        roads: list[Iterable[Attempt]] = [attempts(smooth, begun if quick else chain(begun, later), more, tally)]
         if quick:
             roads = [islice(roads[0], 1)]
         elif rough and rubs:
-            roads.append(_lazily(lambda: stuck(group.solver(rough), rough, begun[0][1], name, tally)))
+            solvers = map(group.solver, [rough])  # made when that road is taken
+            roads.append(x for solver in solvers for x in stuck(solver, rough, begun[0][1], name, tally))
         return _solution(*first_sound(chain(*roads), tally, refused), tally)
 
     return _in_plane_first(group, first, search, quick)
@@ -224,15 +226,6 @@ def settled_with_friction(
         return replace(laid, path=(*laid.path[:-1], f"{laid.path[-1]}, {PUSHED}"))
 
     return _in_plane_first(group, found.state if lays and found is not None else first[1], search)
-
-
-def _begun(group: Group, starts: Iterable[Start]) -> Iterator[Start]:
-    return ((name, group.begun(state)) for name, state in starts)
-
-
-def _lazily(road: Callable[[], Iterator[Attempt]]) -> Iterator[Attempt]:
-    """A road that is made when it is taken."""
-    yield from road()
 
 
 def _in_plane_first(
@@ -333,11 +326,6 @@ class ContactStability:
     def judges(self) -> bool:
         """Whether no end has a moment, which keeps its direction and has no energy."""
         return all(is_without_moment(x.line, x.ends, x.length) for x in self._solver.lines)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether nothing that moves is held here."""
-        return not len(self._solver.bodies)
 
     def holds(self, states: NetworkState) -> bool:
         """Whether an equilibrium would stay; True too where round-off hides it, as of one line (`Stability.holds`)."""
@@ -541,7 +529,7 @@ class _Falls:
     @property
     def finds_all(self) -> bool:
         """Whether what would not stay is found in all cases: a motion to rest needs no push."""
-        return self._stability.judges and self._stability.is_complete
+        return self._stability.judges and not len(self._solver.bodies)  # bodies are held there
 
     @property
     def name(self) -> str:

@@ -19,11 +19,8 @@ from hybrid.kernels.mesh.remesh import ask_cells, change_cells
 from hybrid.kernels.mesh.zone_step import advance_zones
 from hybrid.kernels.run.network import BODY_SAMPLE, book_network_step
 from hybrid.kernels.run.network_run import (
-    CUT_LINE,
     LINE,
     REGROUP,
-    SLACK_LINE,
-    TURNED_LINE,
     blank_steps_job,
     run_lines,
     run_network,
@@ -94,6 +91,7 @@ def no_extremes(columns: int) -> Floats:
     return out
 
 
+NO_PAIRS = np.zeros(0, np.int64)
 # Numbers of the log of all lines, at most.
 MOST_LOGGED = 2_000_000
 # Steps that wait to be logged of what is stepped from outside in real time, where writing must be rare.
@@ -120,7 +118,7 @@ class NetworkSteps:
         self.most_rows = ROWS  # steps that wait to be logged
         self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
         self.clock, self.counts = b.Clock(), b.Counts()
-        self.lines = np.zeros(4, np.int64)
+        self.lines = np.zeros(4, np.int64)  # numbers by kernels.run.network_run, -1: a body, of what was cut or tried
         self._job, self._states, self._cells = Table(blank_steps_job), (NetworkState([]), NetworkState([])), 0
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
         self._solver: NetworkSolver | None = None
@@ -192,7 +190,7 @@ class NetworkSteps:
             members=tables, with_members=np.array([*members], np.int64), stirrer=update_members.address(tables[0])
         )
 
-    def watch(self, even: np.ndarray, odd: np.ndarray, watcher: int) -> None:
+    def watch(self, even: np.ndarray = NO_PAIRS, odd: np.ndarray = NO_PAIRS, watcher: int = 0) -> None:
         """After steps of even and odd parity this kernel looks whether lines have met; 0: none does."""
         self._job.bind(watched_even=even, watched_odd=odd, watcher=watcher)
 
@@ -247,10 +245,6 @@ class NetworkSteps:
     def bind_tangents(self, job: np.ndarray, follower: int) -> None:
         """After every step this kernel takes tangents along it, with a table of kernels.run.network_tangents."""
         self._job.bind(beside=job, tangents=follower)
-
-    def watch_nothing(self) -> None:
-        """Look after no pair of lines."""
-        self._job.bind(watcher=0)
 
     @property
     def turns(self) -> tuple[NetworkState, NetworkState]:
@@ -346,21 +340,6 @@ class NetworkSteps:
         outcome, it, where = int(self.counts.outcome), int(self.counts.tries), int(self.counts.where)
         correction = float(self.clock.correction)
         return NetworkTaken(Outcome(outcome), it, correction, int(self.lines[LINE]), where, np.nan)
-
-    @property
-    def last_cut(self) -> tuple[int, int]:
-        """Line (-1: a body) and cell or node of the last try that was given up."""
-        return int(self.lines[CUT_LINE]), int(self.counts.cut_at)
-
-    @property
-    def turned_line(self) -> int:
-        """Line whose end would have turned too far in a step last."""
-        return int(self.lines[TURNED_LINE])
-
-    @property
-    def slack_line(self) -> int:
-        """Line that was slack last in a step too long for its waves."""
-        return int(self.lines[SLACK_LINE])
 
     # --- checkpoints ----------------------------------------------------------------------------------
 

@@ -304,7 +304,7 @@ class _Ways:
 
         A part of the way that fails is halved.
         """
-        solver, done, part, steps, bits = self.solver, -1.0, 1.0, 0, 0
+        solver, done, part, steps = self.solver, -1.0, 1.0, 0
         while True:
             goal = min(1.0, done + part)
             last, here = goal >= 1.0, solver
@@ -319,10 +319,8 @@ class _Ways:
                 part *= 0.5
             if done >= 1.0 or part <= LEAST_PART or (done < 0.0 and part <= 0.5):
                 break
-        for x in solver.lines:
-            bits |= x.line.bits
         kinds = ((SEABED, "a soft seabed"), (OBSTACLES, "soft obstacles"), (FLOW, "no current"))
-        easy = [name for bit, name in kinds if bits & bit]
+        easy = [name for bit, name in kinds if any(x.line.bits & bit for x in solver.lines)]
         easy += ["little bending"] if any(x.line.element.any() for x in solver.lines) else []
         return self._noted(f"from {', '.join(easy)} in {steps} steps{place}", (taken, found), last)
 

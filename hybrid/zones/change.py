@@ -113,11 +113,6 @@ class ZoneSwitching:
         self._set_line(model.line, model.line.h)
         self.zones.true[:] = np.diff(model.line.s)
 
-    def set_model(self, model: Model, zones: Zones) -> None:
-        """Go on with a model of the same zones in other cells, which have been changed to."""
-        self.model = model
-        self.manager.use_cells_of(model.zoned, zones)
-
     def _set_line(self, line: Line, lengths: Floats) -> None:
         """A line with all of its stiffness and its true lengths; lengths: (N,) m, that its cells have now."""
         zones = self.zones
@@ -412,7 +407,7 @@ def manager_for(
     allowed = Allowed(resolution.zones * model.length, curvature_error, asked, resolution.fineness)
     times = Times(hold, ramp, foreseen, period if curvature_error is None else 0.0)
     given = _given(scene, model, ramp)
-    manager = DomainManager.on_layout(
+    manager = DomainManager(
         model.cable, model.zoned, given, model.tension_scale, allowed, times, criterion, model.on_base
     )
     manager.load(model.ends.moments)

@@ -277,20 +277,22 @@ class DomainManager:
 
     def __init__(
         self,
-        zones: Zones,
         cable: Material,
         layout: Layout,
         given: np.ndarray,
         scale: float,
-        user: UserCriterion | None,
-        on_base: LineOnBase,
+        allowed: Allowed,
+        times: Times,
+        user: UserCriterion | None = None,
+        on_base: LineOnBase | None = None,
     ) -> None:
-        """As of `on_layout`; zones: what the compiled run knows of them, as of `first_zones`."""
-        n = layout.rod.size
-        self.zones, self.cable, self.layout, self.given, self.scale = zones, cable, layout, given, scale
-        self.user, self.on_base = user, on_base
-        self.dwell, self.ramp_time = math.inf, math.inf
-        self.held, self.weightless = False, False
+        """given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N; on_base: of the model."""
+        n, floor = layout.rod.size, tension_floor(cable.mean_bending, np.abs(cable.submerged_weight), scale)
+        self.zones = first_zones(cable, layout, allowed, times)  # what the compiled run knows of them
+        self.cable, self.layout, self.given, self.scale = cable, layout, given, scale
+        self.user, self.on_base = user, on_base or LineOnBase(cable, layout.base)
+        self.dwell, self.ramp_time = times.hold, times.ramp or times.hold
+        self.held, self.weightless = False, bool((floor < WEIGHTLESS * scale).any())
         self.kinked = False  # whether it has been said that kinks of joints count as bends
         self.free = (given >= 0).astype(np.int8)
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
@@ -302,28 +304,8 @@ class DomainManager:
         self.wait_factor, self.released = np.ones(n), np.full(n, -np.inf)
         self._review_room = np.zeros(0), np.zeros(0), np.zeros((4, 0), bool)  # what reviews write
         self._table, self._review = Table(blank_zone_job), Table(blank_review_job)
-
-    @classmethod
-    def on_layout(
-        cls,
-        cable: Material,
-        layout: Layout,
-        given: np.ndarray,
-        scale: float,
-        allowed: Allowed,
-        times: Times,
-        user: UserCriterion | None = None,
-        on_base: LineOnBase | None = None,
-    ) -> DomainManager:
-        """given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N; on_base: of the model."""
-        zones = first_zones(cable, layout, allowed, times)
-        manager = cls(zones, cable, layout, given, scale, user, on_base or LineOnBase(cable, layout.base))
-        manager.dwell, manager.ramp_time = times.hold, times.ramp or times.hold
-        floor = tension_floor(cable.mean_bending, np.abs(cable.submerged_weight), scale)
-        manager.weightless = bool((floor < WEIGHTLESS * scale).any())
-        manager.measure(layout)
-        manager.set_layout(layout)
-        return manager
+        self.measure(layout)
+        self.set_layout(layout)
 
     # --- what the compiled run knows ----------------------------------------------------------------
 

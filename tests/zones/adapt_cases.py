@@ -197,9 +197,7 @@ def weighed(
     scale: float = 1.0, line: Line | None = None,
 ) -> Floats:  # fmt: skip
     """The ratios (criteria, base cells) of a state; before: the state a step dt ago."""
-    manager = DomainManager.on_layout(
-        what, zones, np.zeros(zones.rod.size, int), scale, Allowed(tolerance), Times(dwell)
-    )
+    manager = DomainManager(what, zones, np.zeros(zones.rod.size, int), scale, Allowed(tolerance), Times(dwell))
     line = line or on(what, zones, bits)
     sea, ends = sea or no_sea(line.h.size), ends or still()
     if before is not None:
@@ -242,9 +240,7 @@ def followed(
     if twist is not None:
         angle = np.append(0.0, np.cumsum(twist))[:, None]
         state.a1[:] = np.cos(angle) * state.a1 + np.sin(angle) * np.cross(chords(state), state.a1)
-    manager = DomainManager.on_layout(
-        what, zones, np.ones(n, int), 1.0, Allowed(tolerance, share, fineness=fineness), Times(1.0)
-    )
+    manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(tolerance, share, fineness=fineness), Times(1.0))
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
     manager.zones.next_rod[:] = True
     table = Table(blank_zone_job())

@@ -180,7 +180,7 @@ def test_a_step_that_goes_too_far_is_taken_back():
 def test_a_rod_that_comes_back_is_blended_in_again():
     """On its way out and half gone, a rod is asked for again: it must get all of its stiffness back, and then rest."""
     what, zones = cable(), even(10, "R" * 10)
-    manager = DomainManager.on_layout(what, zones, np.zeros(10, int), 1.0, Allowed(0.1), Times(1.0))
+    manager = DomainManager(what, zones, np.zeros(10, int), 1.0, Allowed(0.1), Times(1.0))
     line = on(what, zones)
     state = state_on(line, lambda s: np.outer(s, X), 500.0)
     still, t = 0.0, 0.0
@@ -204,7 +204,7 @@ def test_a_rod_that_comes_back_is_blended_in_again():
 def test_far_beyond_is_no_tension_that_is_only_foreseen():
     """A tension that falls fast asks for rod; a step is taken back only for what it has become."""
     what, zones = cable(), even(10, "C" * 10)
-    manager = DomainManager.on_layout(what, zones, np.zeros(10, int), 1.0, Allowed(0.1), Times(1.0))
+    manager = DomainManager(what, zones, np.zeros(10, int), 1.0, Allowed(0.1), Times(1.0))
     line, sea = on(what, zones), no_sea(10)
     for T, dt in ((400.0, 0.0), (100.0, 0.05)):
         highest = manager.evaluate_criteria(line, sea, held(), state_on(line, lambda s: np.outer(s, X), T), dt)

@@ -335,7 +335,7 @@ def test_force_catenary_wins():
     zones, what = even(12, "C" * 12), cable()
     state = state_on(on(what, zones), along(), 1e-3 * FLOORED)  # slack everywhere
     given = np.array([0, 0, 0, 1, 1, 1, -1, -1, -1, 0, 0, 0])
-    manager = DomainManager.on_layout(what, zones, given, 1.0, Allowed(TOL), Times(0.5))
+    manager = DomainManager(what, zones, given, 1.0, Allowed(TOL), Times(0.5))
     manager.evaluate_criteria(on(what, zones), no_sea(12), still(), state, 0.0)
     change = manager.review(0.0, state)
     assert change is not None and change.rod.tolist() == (given >= 0).tolist()
@@ -344,7 +344,7 @@ def test_force_catenary_wins():
 def lacks_at_pin(what: Material, tension: Any) -> float:
     """What the criterion of a pin lacks of curvature, as a part of that, of an arc of 0.1 1/m whose ends are pins."""
     zones = even(100, "C" * 100, parts=1)
-    manager = DomainManager.on_layout(what, zones, np.zeros(100, int), 1.0, Allowed(TOL), Times(0.5))
+    manager = DomainManager(what, zones, np.zeros(100, int), 1.0, Allowed(TOL), Times(0.5))
     manager.zones.asked[CURVATURE] = 0.1
     line = on(what, zones)
     state = state_on(

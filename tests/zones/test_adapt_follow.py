@@ -42,9 +42,7 @@ def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
     """Cells that follow change between two reviews, and the manager knows the layout of the last one."""
     what = cable(10.0)
     before, now = (layout(np.linspace(0.0, 10.0, 9), parts, "R" * 8) for parts in (4, 1))
-    managers = [
-        DomainManager.on_layout(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)
-    ]
+    managers = [DomainManager(what, x, np.zeros(8, int), 1e12, Allowed(1e-2, 0.03), Times(1.0)) for x in (before, now)]
     manager, other = managers
     manager.use_cells_of(before, other.zones)  # as a change of cells leaves it
     manager.zones.counts.known, manager.zones.past[:], manager.zones.clock.age = 1, 100.0, 1.0
@@ -99,7 +97,7 @@ def test_chords_become_as_long_as_arcs_to_fourth_order(shape: str) -> None:
         what, zones = cable(), layout(np.linspace(0, 10, n + 1), 1, "R" * n)
         line = on(what, zones)
         state = state_on(line, curve)
-        manager = DomainManager.on_layout(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, 0.05), Times(1.0))
+        manager = DomainManager(what, zones, np.ones(n, int), 1.0, Allowed(1e-2, 0.05), Times(1.0))
         table = Table(blank_zone_job())
         table.bind(line=line, new=state, zones=manager.zones)
         read_arcs(table.numbers)

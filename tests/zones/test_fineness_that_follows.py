@@ -86,7 +86,7 @@ def test_contact_is_foreseen_where_its_edge_goes_in_a_ramp_time(speed: float, sh
     sea = no_sea(line.h.size)._replace(normal=Z, offset=0.0, onset=0.0, stiffness=1e3)
     state = state_on(line, lambda s: np.column_stack([s, 0.0 * s, 0.01 * (s - 52.0)]), 50.0)
     state.v[:, 2] = -0.01 * speed
-    manager = DomainManager.on_layout(what, zones, np.zeros(20, int), 1.0, Allowed(1.0, share), Times(2.0))
+    manager = DomainManager(what, zones, np.zeros(20, int), 1.0, Allowed(1.0, share), Times(2.0))
     manager.evaluate_criteria(line, sea, still(), state, 0.0)
     assert np.flatnonzero(manager.ratios[EDGE]).tolist() == list(raised)
 

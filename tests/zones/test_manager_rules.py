@@ -28,7 +28,7 @@ HOLD = 2.0  # s
 def manager(rod: str, given: Any = None, **times: Any) -> DomainManager:
     """Of ten base cells of 1 m."""
     zones = np.zeros(len(rod), int) if given is None else np.asarray(given)
-    return DomainManager.on_layout(cable(), even(len(rod), rod), zones, 1.0, Allowed(0.01), Times(HOLD, **times))
+    return DomainManager(cable(), even(len(rod), rod), zones, 1.0, Allowed(0.01), Times(HOLD, **times))
 
 
 def becomes(found: DomainManager, rod: str, t: float, urgent: bool = False) -> None:
@@ -139,7 +139,7 @@ def test_rods_are_two_lengths_of_bending_wider_than_what_asks() -> None:
     assert found.buffers(state_on(line, along(), tension=50.0)) == pytest.approx(2.0 * np.sqrt(2.0 / 50.0))
     assert found.buffers(state_on(line, along(), tension=2.0)) == pytest.approx(2.0 * (2.0 / 10.0) ** (1.0 / 3.0))
     allowed = Allowed(0.01, asked={CURVATURE: 0.05})
-    found = DomainManager.on_layout(cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, allowed, Times(HOLD))
+    found = DomainManager(cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, allowed, Times(HOLD))
     assert (found.buffers(state_on(line, along(), tension=50.0)) >= 1.0).all()
 
 
@@ -154,7 +154,7 @@ def test_a_rod_on_its_way_out_comes_back_above_half_of_what_makes_a_rod() -> Non
 def test_the_user_speaks_for_catenaries_that_may_be_rods() -> None:
     for rod, given, highest_ratio in (("C" * 10, 0, 3.0), ("R" * 10, 0, 0.0), ("C" * 10, -1, 0.0)):
         zones = np.full(10, given)
-        found = DomainManager.on_layout(
+        found = DomainManager(
             cable(), even(10, rod), zones, 1.0, Allowed(0.01), Times(HOLD), lambda nodes: np.full(nodes.s.size, 3.0)
         )
         line = on(found.cable, found.layout)
@@ -245,7 +245,7 @@ def test_rods_are_urgent_where_a_line_without_weight_loses_tension(
     """From `before` (N) a ramp time ago to 50 now: 14 in a ramp time are less than 0.3 of that, 16 are not."""
     floor = float(manager("C" * 10).floor.max())  # N, of 10 N/m: without weight where it is below 1e-3 of the scale
     scale = 1e3 * floor * (1.01 if weightless else 0.99)
-    found = DomainManager.on_layout(cable(), even(10, "C" * 10), np.zeros(10, int), scale, Allowed(0.01), Times(HOLD))
+    found = DomainManager(cable(), even(10, "C" * 10), np.zeros(10, int), scale, Allowed(0.01), Times(HOLD))
     found.zones.past[:], found.zones.counts.known, found.zones.clock.age = before, 1, HOLD
     found.ratios[BEND, 7] = 1.5
     change = review_of(found, tension=50.0)

@@ -193,8 +193,7 @@ def address(array: NDArray[Any]) -> int:
     try:
         return addressof(c_char.from_buffer(array))  # type: ignore[arg-type]
     except (TypeError, ValueError):  # nobody may write to it, or it is empty: numpy's own way takes four times as long
-        found: int = array.__array_interface__["data"][0]
-        return found
+        return array.__array_interface__["data"][0]
 
 
 class Packed:
@@ -324,8 +323,7 @@ def places(example: Any) -> dict[str, int]:
 
 def _bits(value: float) -> int:
     """The bits of a number as an integer."""
-    found: int = unpack("q", pack("d", value))[0]
-    return found
+    return unpack("q", pack("d", value))[0]
 
 
 class _ArrayPattern:

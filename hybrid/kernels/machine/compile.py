@@ -83,8 +83,7 @@ class Entry(_Function):
 
     def address(self, *args: Any) -> int:
         """Where the machine code for arguments of the types of these is, for kernels.machine.references.caller."""
-        found: int = self._code.taking(args).address
-        return found
+        return self._code.taking(args).address
 
     def compile_unless_busy(self, *args: Any) -> None:
         """Compile for arguments of the types of these, unless another process is doing it."""
@@ -93,8 +92,7 @@ class Entry(_Function):
     @property
     def is_kept(self) -> bool:
         """Whether its machine code is on disk, for some arguments."""
-        found: bool = self._code.is_kept
-        return found
+        return self._code.is_kept
 
     @property
     def signatures(self) -> list[Any]:
@@ -141,8 +139,7 @@ class Linked(Entry):
 def entry(name: str) -> Entry:
     """The kernel of a name, as room.file.function."""
     file, _, function = name.rpartition(".")
-    found: Entry = getattr(import_module(f"hybrid.kernels.{file}"), function)
-    return found
+    return getattr(import_module(f"hybrid.kernels.{file}"), function)
 
 
 def is_warm(kernels: Sequence[str]) -> bool:

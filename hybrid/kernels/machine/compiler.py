@@ -223,8 +223,7 @@ class Made(NamedTuple):
     def code(self) -> bytes:
         """The object, which kernels.machine.linked_code.link takes."""
         self.result.library._ensure_finalized()
-        code: bytes = self.result.library._get_compiled_object()
-        return code
+        return self.result.library._get_compiled_object()
 
     @property
     def names(self) -> dict[str, str]:

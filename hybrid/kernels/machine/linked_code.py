@@ -89,8 +89,7 @@ def _find(name: str) -> int:
 @cache
 def _failing() -> int:
     """The address of a kernel that fails with a number that numba has for nothing: its caller raises SystemError."""
-    address: int = _engine("define i32 @failing() { ret i32 -4 }").get_function_address("failing")
-    return address
+    return _engine("define i32 @failing() { ret i32 -4 }").get_function_address("failing")
 
 
 @cache

@@ -399,8 +399,7 @@ def solve_task(task: Task, line: Line, sea: Sea, ends: Ends, states: States, wor
     check_turns(line, states.new)
     table, (old, new, was, now) = _here.table, states
     table.bind(task=task, line=line, sea=sea, ends=ends, old=old, new=new, was=was, now=now, work=work)
-    found: tuple[int, int, float, int] = (in_plane if line.bits & PLANAR else in_space)(table.numbers)
-    return found
+    return (in_plane if line.bits & PLANAR else in_space)(table.numbers)
 
 
 def check_turns(line: Line, state: State) -> None:
