@@ -104,7 +104,7 @@ class Members:
         self.update_water(np.inf, row, 0.0, out)
         for x, mass in zip(out, out[:, WET] * self._sizes[:, 0], strict=True):
             p, d = x[MIDDLE:ALONG], x[ALONG:CN]
-            G = np.hstack([np.eye(3), -np.cross(np.eye(3), p).T])
+            G = np.hstack([np.eye(3), np.cross(np.eye(3), p).T])  # velocity there: v + w x p
             M += G.T @ (mass * (np.eye(3) - np.outer(d, d))) @ G
         return M
 
