@@ -9,6 +9,7 @@ at the edge, with time, place, cause, remedy and the snapshot that was left.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from enum import IntEnum
 from importlib import import_module
@@ -303,3 +304,13 @@ class ComputationError(HybridError):
         if snapshot is not None:
             lines.append(f"    snapshot: {snapshot}")
         super().__init__("\n".join(lines))
+
+
+def renamed(old: str, new: str) -> Any:
+    """A property under its former name, with a warning."""
+
+    def value(self: Any) -> Any:
+        warnings.warn(f"{old} is now {new}", DeprecationWarning, stacklevel=2)
+        return getattr(self, new)
+
+    return property(value)

@@ -97,6 +97,14 @@ def window(text: str) -> tuple[float | None, float | None]:
     return window
 
 
+def option(metavar: str, help: str, *names: str, **how: Any) -> Any:
+    return typer.Option(*names, metavar=metavar, help=help, **how)
+
+
+def argument(metavar: str, help: str) -> Any:
+    return typer.Argument(metavar=metavar, help=help, show_default=False)
+
+
 def flag(*names: str, help: str) -> Any:
     return typer.Option(*names, metavar="", help=help)  # it takes no value, so none is named
 
@@ -105,18 +113,16 @@ def plot_option(what: str) -> Any:
     return typer.Option("--plot", metavar="FILE", help=f"Draw {what} into a PNG, PDF or SVG.")
 
 
-def output_option(help: str) -> Any:
-    return typer.Option("--output", "-o", metavar="FILE", help=help)
+def output_option(help: str, metavar: str = "FILE") -> Any:
+    return typer.Option("--output", "-o", metavar=metavar, help=help)
 
 
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The scene to read.", show_default=False)]
+SceneFile = Annotated[Path, argument("SCENE.yaml", "The scene to read.")]
 RunFile = Annotated[Path | None, output_option("Result; else SCENE.h5, in this folder.")]
 StaticFile = Annotated[Path | None, output_option("Result; else SCENE.static.h5, here.")]
 Picture = Annotated[Path | None, output_option("PNG, PDF or SVG; else RUN.png, RUN.zones.png.")]
-LineName = Annotated[str | None, typer.Option("--line", metavar="NAME", help="Of several lines, this one.")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in time.step=0.005.")
-]
+LineName = Annotated[str | None, option("NAME", "Of several lines, this one.", "--line")]
+Settings = Annotated[list[str] | None, option("KEY=VALUE", "Change a value, as in time.step=0.005.", "--set")]
 Drawn = Annotated[bool, flag("--plot", help="Draw it as well, as PNG beside it.")]
 Keep = Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older result.")]
 Foreign = Annotated[bool, flag("--overwrite", help="Replace a file that is not of hybrid.")]

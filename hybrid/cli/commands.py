@@ -37,10 +37,12 @@ from hybrid.cli.app import (
     StaticFile,
     UsageError,
     app,
+    argument,
     flag,
     load,
     numbers,
     opened_line,
+    option,
     output_option,
     picture_beside,
     report_error,
@@ -62,19 +64,13 @@ if TYPE_CHECKING:
 
 @app.command()
 def plot(
-    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to draw.", show_default=False)],
+    result: Annotated[Path, argument("RUN.h5", "The result to draw.")],
     output: Picture = None,
-    times: Annotated[Any, typer.Option(metavar="T,T,..", parser=numbers, help="Earlier shapes to draw (s).")] = None,
-    history: Annotated[
-        Any, typer.Option(metavar="S,S,..", parser=numbers, help="Arc lengths to follow over time (m).")
-    ] = None,
+    times: Annotated[Any, option("T,T,..", "Earlier shapes to draw (s).", parser=numbers)] = None,
+    history: Annotated[Any, option("S,S,..", "Arc lengths to follow over time (m).", parser=numbers)] = None,
     zones: Annotated[bool, flag("--zones", help="Draw zones along s over time instead.")] = False,
-    quantity: Annotated[
-        str | None, typer.Option(metavar="NAME", help="One quantity instead; `hybrid plan --outputs` lists them.")
-    ] = None,
-    at: Annotated[
-        Any, typer.Option(metavar="S,S,..", parser=numbers, help="Its histories at these arc lengths (m).")
-    ] = None,
+    quantity: Annotated[str | None, option("NAME", "One quantity instead; `hybrid plan --outputs` lists them.")] = None,
+    at: Annotated[Any, option("S,S,..", "Its histories at these arc lengths (m).", parser=numbers)] = None,
     envelope: Annotated[bool, flag("--envelope", help="Its lowest and highest value along the line.")] = False,
     spectrum: Annotated[bool, flag("--spectrum", help="The spectra of its histories.")] = False,
     film: Annotated[bool, flag("--animate", help="Make a film instead, RUN.mp4 or a .gif.")] = False,
@@ -118,15 +114,10 @@ def plot(
 
 @app.command()
 def report(
-    results: Annotated[
-        list[Path],
-        typer.Argument(metavar="RUN.h5 ..", help="Result; several to compare; or STUDY.zarr.", show_default=False),
-    ],
+    results: Annotated[list[Path], argument("RUN.h5 ..", "Result; several to compare; or STUDY.zarr.")],
     output: Annotated[Path | None, output_option("Page; else RUN.html, beside it.")] = None,
     line: LineName = None,
-    modes: Annotated[
-        int, typer.Option(metavar="N", min=0, max=200, help="Show so many natural modes of the scene, too.")
-    ] = 0,
+    modes: Annotated[int, option("N", "Show so many natural modes of the scene, too.", min=0, max=200)] = 0,
     overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -181,16 +172,14 @@ def _comparison(
 
 @app.command()
 def export(
-    result: Annotated[
-        Path, typer.Argument(metavar="RUN.h5", help="The result to export, or the scene of an FMU.", show_default=False)
-    ],
+    result: Annotated[Path, argument("RUN.h5", "The result to export, or the scene of an FMU.")],
     output: Annotated[Path | None, output_option("FILE.nc, .csv, .vtkhdf, .fmu; else RUN.nc ..")] = None,
     format: Annotated[
-        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf, fatigue or fmu; else by the name of FILE.")
+        str | None, option("FORMAT", "nc, csv, vtkhdf, fatigue or fmu; else by the name of FILE.")
     ] = None,
-    at: Annotated[Any, typer.Option(metavar="S,S,..", parser=numbers, help="Only at these arc lengths (m).")] = None,
-    names: Annotated[Any, typer.Option(metavar="NAME,..", parser=words, help="Only these fields or groups.")] = None,
-    times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
+    at: Annotated[Any, option("S,S,..", "Only at these arc lengths (m).", parser=numbers)] = None,
+    names: Annotated[Any, option("NAME,..", "Only these fields or groups.", parser=words)] = None,
+    times: Annotated[Any, option("A:B", "Only from A to B (s).", parser=window)] = None,
     line: LineName = None,
     moordyn: Annotated[bool, flag("--moordyn", help="The scene of the result as a MoorDyn deck, RUN.txt.")] = False,
     settings: Settings = None,
@@ -221,7 +210,10 @@ def export(
         kind, all_made = format_of(output, format), []
         with opened_line(result, line) as (opened, result):
             for file in files_of(opened, output or result.with_suffix(SUFFIXES[kind]), kind, names):
-                places, name = at if file.has_places else None, f"{file.line}: " if file.line else ""
+                places, name = (
+                    None if file.result.lines and not file.line else at,
+                    f"{file.line}: " if file.line else "",
+                )
                 made = hybrid.export(
                     file.result, file.path, format=format, names=file.names, times=times, at=places, overwrite=not keep
                 )
@@ -264,12 +256,7 @@ NEEDED = ("starlette", "uvicorn", "websockets")
 
 @app.command()
 def view(
-    file: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[SCENE.yaml|RUN.h5]", help="A scene or a result; none: a new scene.", show_default=False
-        ),
-    ] = None,
+    file: Annotated[Path | None, argument("[SCENE.yaml|RUN.h5]", "A scene or a result; none: a new scene.")] = None,
     no_browser: Annotated[bool, flag("--no-browser", help="Print the address, and open no browser.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -336,15 +323,13 @@ def run(
 
 @app.command()
 def resume(
-    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to go on with.", show_default=False)],
+    result: Annotated[Path, argument("RUN.h5", "The result to go on with.")],
     output: Annotated[Path | None, output_option("Another file; else the same.")] = None,
-    until: Annotated[float | None, typer.Option(metavar="T", help="Go on until then (s).")] = None,
+    until: Annotated[float | None, option("T", "Go on until then (s).")] = None,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Other currents, waves, motions, loads ..")
+        list[str] | None, option("KEY=VALUE", "Other currents, waves, motions, loads ..", "--set")
     ] = None,
-    start: Annotated[
-        float | None, typer.Option("--from", metavar="T", help=".. from then on (s); else from where it is.")
-    ] = None,
+    start: Annotated[float | None, option("T", ".. from then on (s); else from where it is.", "--from")] = None,
     plot: Drawn = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -375,13 +360,11 @@ def static(
     quiet: Quiet = False,
     as_json: Json = False,
     stiffness: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="Stiffness at body:NAME or point:NAME (a cable: start, end).")
+        str | None, option("WHAT", "Stiffness at body:NAME or point:NAME (a cable: start, end).")
     ] = None,
-    offsets: Annotated[
-        str | None, typer.Option(metavar="WHAT", help="Forces on WHAT, as above, held beside its place ..")
-    ] = None,
-    reach: Annotated[float | None, typer.Option(metavar="M", help=".. up to so many metres to either side ..")] = None,
-    heading: Annotated[float, typer.Option(metavar="DEG", help=".. along a heading from the x axis.")] = 0.0,
+    offsets: Annotated[str | None, option("WHAT", "Forces on WHAT, as above, held beside its place ..")] = None,
+    reach: Annotated[float | None, option("M", ".. up to so many metres to either side ..")] = None,
+    heading: Annotated[float, option("DEG", ".. along a heading from the x axis.")] = 0.0,
 ) -> None:
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
@@ -434,18 +417,12 @@ def plan(
 def trade(
     context: typer.Context,
     scene: SceneFile,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Else SCENE.trade, in this folder.")
-    ] = None,
-    models: Annotated[
-        Any, typer.Option(metavar="KIND,..", parser=words, help="Else all that the scene admits.")
-    ] = None,
-    accuracies: Annotated[Any, typer.Option(metavar="A,A,..", parser=words, help="Else 10%,3%,1%,0.3%,0.1%.")] = None,
-    reference: Annotated[
-        str | None, typer.Option(metavar="A", help="Of the rod to compare with; else 0.03% or finer.")
-    ] = None,
-    target: Annotated[str, typer.Option("--for", metavar="A", help="Accuracy to recommend a setting for.")] = "1%",
-    repeat: Annotated[int, typer.Option(metavar="N", help="Runs of which the median CPU time counts.")] = 1,
+    output: Annotated[Path | None, output_option("Else SCENE.trade, in this folder.", "FOLDER")] = None,
+    models: Annotated[Any, option("KIND,..", "Else all that the scene admits.", parser=words)] = None,
+    accuracies: Annotated[Any, option("A,A,..", "Else 10%,3%,1%,0.3%,0.1%.", parser=words)] = None,
+    reference: Annotated[str | None, option("A", "Of the rod to compare with; else 0.03% or finer.")] = None,
+    target: Annotated[str, option("A", "Accuracy to recommend a setting for.", "--for")] = "1%",
+    repeat: Annotated[int, option("N", "Runs of which the median CPU time counts.")] = 1,
     peers: Annotated[bool, typer.Option("--peers", hidden=True)] = False,
     levels: Annotated[
         bool, flag("--levels", help="Instead: what position and tension, moments, curvature cost with every model.")
@@ -500,11 +477,9 @@ def _trade_levels(console: Any, scene: Any, folder: Path, repeat: int, command: 
 
 @app.command("import")
 def import_(
-    deck: Annotated[Path, typer.Argument(metavar="DECK", help="A MoorDyn input file.", show_default=False)],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="SCENE.yaml|FOLDER", help="Else this folder.")
-    ] = None,
-    line: Annotated[int | None, typer.Option(metavar="ID", help="Only the cable with this line.")] = None,
+    deck: Annotated[Path, argument("DECK", "A MoorDyn input file.")],
+    output: Annotated[Path | None, output_option("Else this folder.", "SCENE.yaml|FOLDER")] = None,
+    line: Annotated[int | None, option("ID", "Only the cable with this line.")] = None,
     separate: Annotated[bool, flag("--separate", help="Each cable as a scene of its own.")] = False,
     overwrite: Annotated[bool, flag("--overwrite", help="Replace scenes that are there.")] = False,
     quiet: Quiet = False,

@@ -234,7 +234,7 @@ class Console:
             return
         sys.stdout.write(json.dumps({"event": event} | _finite(facts), default=str, allow_nan=False) + "\n")
         sys.stdout.flush()
-        if event == "progress" and reader_has_gone():
+        if event == "progress" and (stream := _output_stream()) is not None and stream.dropped:
             raise KeyboardInterrupt  # nobody follows the run: end it as by Ctrl-C
 
     def note(self, text: str) -> None:
@@ -550,12 +550,6 @@ def guard_output() -> None:
             setattr(
                 sys, name, io.TextIOWrapper(to, stream.encoding, stream.errors, line_buffering=stream.line_buffering)
             )
-
-
-def reader_has_gone() -> bool:
-    """Whether output was dropped because its reader has closed the pipe."""
-    stream = _output_stream()
-    return stream is not None and stream.dropped
 
 
 def raise_lost_output() -> None:

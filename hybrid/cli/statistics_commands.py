@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import typer
 
 import hybrid
 from hybrid.cli.app import (
@@ -19,10 +18,12 @@ from hybrid.cli.app import (
     Settings,
     UsageError,
     app,
+    argument,
     flag,
     load,
     numbers,
     opened_line,
+    option,
     session,
     window,
     words,
@@ -44,9 +45,9 @@ LEAST = 1e-6  # of the largest: smaller motions are those of round-off
 def response(
     scene: SceneFile,
     settings: Settings = None,
-    hours: Annotated[float, typer.Option(metavar="H", help="Largest values of so many hours.")] = 3.0,
+    hours: Annotated[float, option("H", "Largest values of so many hours.")] = 3.0,
     smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
-    check: Annotated[float | None, typer.Option(metavar="S", help="Compare with a run in time of so many s.")] = None,
+    check: Annotated[float | None, option("S", "Compare with a run in time of so many s.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -146,12 +147,10 @@ LEAST_SHARE = 0.05  # of the energy, the least part that is shown
 def modes(
     scene: SceneFile,
     settings: Settings = None,
-    count: Annotated[int, typer.Option("--count", metavar="N", help="How many, the longest periods first.")] = 10,
-    near: Annotated[float | None, typer.Option(metavar="S", help="Those nearest to this period (s) instead.")] = None,
+    count: Annotated[int, option("N", "How many, the longest periods first.", "--count")] = 10,
+    near: Annotated[float | None, option("S", "Those nearest to this period (s) instead.")] = None,
     smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the shapes: PNG, PDF, SVG; HTML, where they swing.")
-    ] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw the shapes: PNG, PDF, SVG; HTML, where they swing.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -195,39 +194,27 @@ def _modes_table(found: Modes) -> Any:
 HOUR = 3600.0  # s
 
 # Options of fatigue and of mooring lines, which only `stats` has.
-Strength = Annotated[float | None, typer.Option(metavar="N", help=".. of tension over this strength (N), or ..")]
-Section = Annotated[
-    Any, typer.Option(metavar="A,D,E", parser=numbers, help=".. of stress: area (m2), diameter (m), modulus (Pa).")
-]
-Mooring = Annotated[
-    float | None, typer.Option(metavar="N", help="Utilisation by DNV-OS-E301 of this strength (N), with ..")
-]
-LoadFactors = Annotated[
-    Any, typer.Option(metavar="A,B", parser=numbers, help=".. load factors of pretension and environment, and ..")
-]
-Pretension = Annotated[
-    str | None, typer.Option(metavar="N|REST.h5", help=".. a pretension (N), or the equilibrium that has it.")
-]
+Strength = Annotated[float | None, option("N", ".. of tension over this strength (N), or ..")]
+Section = Annotated[Any, option("A,D,E", ".. of stress: area (m2), diameter (m), modulus (Pa).", parser=numbers)]
+Mooring = Annotated[float | None, option("N", "Utilisation by DNV-OS-E301 of this strength (N), with ..")]
+LoadFactors = Annotated[Any, option("A,B", ".. load factors of pretension and environment, and ..", parser=numbers)]
+Pretension = Annotated[str | None, option("N|REST.h5", ".. a pretension (N), or the equilibrium that has it.")]
 
 
 @app.command()
 def stats(
-    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to look at.", show_default=False)],
-    names: Annotated[
-        Any, typer.Option(metavar="NAME,..", parser=words, help="These quantities; else forces, tension, bending.")
-    ] = None,
-    at: Annotated[
-        Any, typer.Option(metavar="S,S,..", parser=numbers, help="At these arc lengths (m); else where it is largest.")
-    ] = None,
-    times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
-    hours: Annotated[float, typer.Option(metavar="H", help="Extremes of so many hours.")] = 3.0,
+    result: Annotated[Path, argument("RUN.h5", "The result to look at.")],
+    names: Annotated[Any, option("NAME,..", "These quantities; else forces, tension, bending.", parser=words)] = None,
+    at: Annotated[Any, option("S,S,..", "At these arc lengths (m); else where it is largest.", parser=numbers)] = None,
+    times: Annotated[Any, option("A:B", "Only from A to B (s).", parser=window)] = None,
+    hours: Annotated[float, option("H", "Extremes of so many hours.")] = 3.0,
     above: Annotated[
-        float | None, typer.Option(metavar="X", help="Also the part of the time above X, in the unit of the quantity.")
+        float | None, option("X", "Also the part of the time above X, in the unit of the quantity.")
     ] = None,
     below: Annotated[
-        float | None, typer.Option(metavar="X", help="Also the part of the time below X, in the unit of the quantity.")
+        float | None, option("X", "Also the part of the time below X, in the unit of the quantity.")
     ] = None,
-    curve: Annotated[str | None, typer.Option(metavar="NAME", help="Fatigue damage by this curve ..")] = None,
+    curve: Annotated[str | None, option("NAME", "Fatigue damage by this curve ..")] = None,
     strength: Strength = None,
     section: Section = None,
     mooring: Mooring = None,
@@ -289,7 +276,9 @@ def _show_values(console: Console, opened: Result, names: Any, at: Any) -> None:
     values = values_of(opened, names, at)
     for row in values:
         console.json("statistics", **row)
-    console.show(lambda: _values_table(values))
+    texts = (["" if x is None else f"{x:.5g}" for x in (row["s"], row["value"])] for row in values)
+    names = [f"{row['quantity']} ({row['unit']})" for row in values]
+    console.show(lambda: table_of(("", "s (m)", "value"), [[x, *text] for x, text in zip(names, texts, strict=True)]))
     console.note("note: of an equilibrium, which has values and no statistics")
 
 
@@ -355,17 +344,13 @@ def _moored(
     """Where a mooring line is used most by DNV-OS-E301, in numbers and in words; pretension: N, or a file."""
     from hybrid.store.verdicts import doubt_of
 
-    def used(before: Any) -> tuple[Any, Any]:
-        s, _, most = result.mooring(strength, factors, before)
-        return s, most
-
     try:
         number = float(pretension)
     except ValueError:
         with opened_line(Path(pretension), line) as (rest, _):
-            s, most = used(rest)
+            s, _, most = result.mooring(strength, factors, rest)
     else:
-        s, most = used(number)
+        s, _, most = result.mooring(strength, factors, number)
     k, doubt = int(most.argmax()), doubt_of(result, "tension")
     text = (
         f"mooring line by DNV-OS-E301 (2021), factors {', '.join(f'{x:g}' for x in factors)}, strength {strength:g} N: "
@@ -389,13 +374,6 @@ def _statistics_table(rows: list[dict[str, Any]], hours: float) -> Any:
         cells = [text(x) for x in numbers]
         texts.append([f"{row['quantity']} ({row['unit']})", *cells[:3], skewness, *cells[3:]])
     return table_of(heads, texts)
-
-
-def _values_table(rows: list[dict[str, Any]]) -> Any:
-    """Values of an equilibrium."""
-    texts = (["" if x is None else f"{x:.5g}" for x in (row["s"], row["value"])] for row in rows)
-    names = [f"{row['quantity']} ({row['unit']})" for row in rows]
-    return table_of(("", "s (m)", "value"), [[name, *text] for name, text in zip(names, texts, strict=True)])
 
 
 def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float | None) -> list[str]:

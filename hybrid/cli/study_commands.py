@@ -12,8 +12,6 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 import hybrid
 from hybrid.cli.app import (
     Json,
@@ -22,8 +20,10 @@ from hybrid.cli.app import (
     Settings,
     UsageError,
     app,
+    argument,
     flag,
     load,
+    option,
     output_option,
     plot_option,
     session,
@@ -33,7 +33,6 @@ from hybrid.cli.console import Console, span, table_of
 
 if TYPE_CHECKING:
     from hybrid.designs.design import Found, Identified, Kept
-    from hybrid.designs.nearest import Sought
     from hybrid.designs.sensitivity import Derivative
     from hybrid.scene.root import Scene
 
@@ -42,7 +41,7 @@ WORDS = {0: "=", 1: "<=", -1: ">="}
 
 @app.command()
 def design(
-    source: Annotated[Path, typer.Argument(metavar="DESIGN.yaml", help="The design file.", show_default=False)],
+    source: Annotated[Path, argument("DESIGN.yaml", "The design file.")],
     output: Annotated[Path | None, output_option("Write the scene with the numbers found.")] = None,
     plot: Annotated[Path | None, plot_option("before and after")] = None,
     quiet: Quiet = False,
@@ -167,14 +166,10 @@ def shown(kept: tuple[Kept, ...]) -> list[Kept]:
 @app.command()
 def seek(
     scene: SceneFile,
-    target: Annotated[
-        list[str], typer.Option("--target", metavar="RESULT=VALUE", help="Such as tension@250=25000; more than once.")
-    ],
-    by: Annotated[Any, typer.Option("--by", metavar="KEY,..", parser=words, help="As many numbers to change.")],
+    target: Annotated[list[str], option("RESULT=VALUE", "Such as tension@250=25000; more than once.", "--target")],
+    by: Annotated[Any, option("KEY,..", "As many numbers to change.", "--by", parser=words)],
     settings: Settings = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the scene with the numbers found.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Write the scene with the numbers found.")] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -194,15 +189,12 @@ def seek(
             if output.exists():
                 raise hybrid.ResultError(f"{output} exists\n    try:      another name")
             output.write_text(hybrid.scene_text(found.scene), encoding="utf-8")
-        console.show(lambda: _design_table(found))
+        lines, heads = [[key, f"{x:.8g}", ""] for key, x in found.numbers.items()], ("", "value", "asked")
+        lines += [[name, f"{x:.8g}", f"{found.targets[name]:.8g}"] for name, x in found.results.items()]
+        title = f"found in {found.equilibria} equilibria"
+        console.show(lambda: table_of(heads, lines, free=heads, title=title))
         facts: dict[str, Any] = {x: dict(getattr(found, x)) for x in ("numbers", "results", "targets")}
         console.json("sought", **facts, equilibria=found.equilibria, scene=output and str(output))
-
-
-def _design_table(found: Sought) -> Any:
-    rows, heads = [[key, f"{x:.8g}", ""] for key, x in found.numbers.items()], ("", "value", "asked")
-    rows += [[name, f"{x:.8g}", f"{found.targets[name]:.8g}"] for name, x in found.results.items()]
-    return table_of(heads, rows, free=heads, title=f"found in {found.equilibria} equilibria")
 
 
 # The command sensitivity: what results at rest answer to the numbers of a scene.
@@ -213,12 +205,10 @@ def sensitivity(
     scene: SceneFile,
     settings: Settings = None,
     of: Annotated[
-        list[Any] | None,
-        typer.Option("--of", metavar="RESULT,..", parser=words, help="Results such as tension@0, max curvature."),
+        list[Any] | None, option("RESULT,..", "Results such as tension@0, max curvature.", "--of", parser=words)
     ] = None,
     by: Annotated[
-        list[Any] | None,
-        typer.Option("--by", metavar="KEY,..", parser=words, help="Numbers; else all of the sections."),
+        list[Any] | None, option("KEY,..", "Numbers; else all of the sections.", "--by", parser=words)
     ] = None,
     motion: Annotated[
         bool, flag("--motion", help="Of a run, in steps that stay: of 'max tension@end', 'std position.z@100'.")
@@ -291,24 +281,16 @@ REASONS_SHOWN = 5
 
 @app.command()
 def study(
-    source: Annotated[
-        Path, typer.Argument(metavar="STUDY.yaml", help="The study file, or its results.", show_default=False)
-    ],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Results (Zarr); else STUDY.zarr there.")
-    ] = None,
-    workers: Annotated[int | None, typer.Option(metavar="N", min=1, help="Processes; else one for each core.")] = None,
+    source: Annotated[Path, argument("STUDY.yaml", "The study file, or its results.")],
+    output: Annotated[Path | None, output_option("Results (Zarr); else STUDY.zarr there.", "FOLDER")] = None,
+    workers: Annotated[int | None, option("N", "Processes; else one for each core.", min=1)] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of a dask scheduler, such as tcp://host:8786, instead.")
+        str | None, option("ADDRESS", "Of a dask scheduler, such as tcp://host:8786, instead.")
     ] = None,
-    batch: Annotated[int | None, typer.Option(metavar="N", min=1, help="Cases in a batch; else by their cost.")] = None,
-    netcdf: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="The results as netCDF as well.")] = None,
-    case: Annotated[
-        int | None, typer.Option(metavar="N", min=0, help="Run one case of STUDY.zarr again, with its whole result.")
-    ] = None,
-    sensitivity: Annotated[
-        str | None, typer.Option(metavar="RESULT", help="What each variable of STUDY.zarr does to a result.")
-    ] = None,
+    batch: Annotated[int | None, option("N", "Cases in a batch; else by their cost.", min=1)] = None,
+    netcdf: Annotated[Path | None, option("FILE.nc", "The results as netCDF as well.")] = None,
+    case: Annotated[int | None, option("N", "Run one case of STUDY.zarr again, with its whole result.", min=0)] = None,
+    sensitivity: Annotated[str | None, option("RESULT", "What each variable of STUDY.zarr does to a result.")] = None,
     derivatives: Annotated[
         bool, flag("--derivatives", help="With --sensitivity: shares of the spread by derivatives at the mean.")
     ] = False,
@@ -352,7 +334,10 @@ def _show_sensitivity(console: Console, source: Path, result: str, derivatives: 
     rows = hybrid.sensitivity(source, result)
     for row in rows:
         console.json("influence", **row._asdict())
-    console.show(lambda: _influences(rows))
+    heads = HEADS[rows[0].method] if rows else ("nothing varies",)
+    texts = ([f"{x:.3g}" if x == x else "" for x in (row.first, row.total, row.interval)] for row in rows)
+    lines = [[row.variable, *text] for row, text in zip(rows, texts, strict=True)]
+    console.show(lambda: table_of(("", *heads), lines))
     if derivatives:
         _show_shares(console, hybrid.shares(source, result))
     console.json("done", file=str(source))
@@ -360,7 +345,7 @@ def _show_sensitivity(console: Console, source: Path, result: str, derivatives: 
 
 def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path | None) -> None:
     """Ranges of what was kept, reasons of what failed, and where it is."""
-    from hybrid.store.study_file import DONE, FAILED, counts_of, unmet_accuracy
+    from hybrid.store.study_file import DONE, FAILED, counts_of, ranges_of, reasons_of, unmet_accuracy
 
     counts = counts_of(found["status"].values)
     done = found.isel(case=found["status"].values == DONE)
@@ -370,10 +355,7 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
         console.json("range", **row)
     if rows:
         console.show(lambda: _study_table(rows))
-    reasons: dict[str, list[int]] = {}
-    for number, reason in zip(failed["case"].values.tolist(), failed["reason"].values.tolist(), strict=True):
-        reasons.setdefault(_kind(str(reason)), []).append(number)
-    for text, numbers in sorted(reasons.items(), key=lambda x: -len(x[1]))[:REASONS_SHOWN]:
+    for text, numbers in reasons_of(failed)[:REASONS_SHOWN]:
         console.json("failed", reason=text, cases=numbers)
         console.note(f"note: {len(numbers)} failed, such as case {numbers[0]}: {text}")
     lacking = done.isel(case=done["reason"].values != "")
@@ -397,39 +379,11 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
     console.done(text, folder, netcdf, **counts, wall=wall)
 
 
-def ranges_of(done: Any) -> list[dict[str, Any]]:
-    """Of each number that was kept: smallest, median and largest value of all cases, and the case of the largest."""
-    import numpy as np
-
-    from hybrid.store.study_file import OWN
-
-    rows = []
-    for name in done.data_vars:
-        values = done[name].values
-        if done[name].dims != ("case",) or values.dtype.kind != "f" or name in OWN:
-            continue
-        if not np.isfinite(values).any():
-            blank = {key: None for key in ("smallest", "median", "largest", "case")}
-            rows.append({"name": str(name), "unit": done[name].attrs.get("units", "")} | blank)
-            continue
-        worst = int(np.nanargmax(values))
-        row = {"name": str(name), "unit": done[name].attrs.get("units", ""), "smallest": float(np.nanmin(values))}
-        row |= {"median": float(np.nanmedian(values)), "largest": float(values[worst])}
-        rows.append(row | {"case": int(done["case"].values[worst])})
-    return sorted(rows, key=lambda row: row["name"])
-
-
 HEADS = {
     "sobol": ("first order", "total", "± (95 %)"),
     "morris": ("mean effect", "standard deviation", "± (95 %)"),
     "rank": ("rank correlation", "", "by chance"),
 }
-
-
-def _influences(rows: list[Any]) -> Any:
-    heads = HEADS[rows[0].method] if rows else ("nothing varies",)
-    texts = ([f"{x:.3g}" if x == x else "" for x in (row.first, row.total, row.interval)] for row in rows)
-    return table_of(("", *heads), [[row.variable, *text] for row, text in zip(rows, texts, strict=True)])
 
 
 def _show_shares(console: Console, found: Any) -> None:
@@ -443,11 +397,6 @@ def _show_shares(console: Console, found: Any) -> None:
         console.note(f"note: no shares by derivatives: {found.why}")
     else:
         console.note(f"note: of {found.of} at the mean; R² {found.r2:.4f} over {found.cases} cases")
-
-
-def _kind(reason: str) -> str:
-    """A reason without its place and time, so that those of one kind are counted together."""
-    return reason.split(" (t = ")[0]
 
 
 def _study_table(rows: list[dict[str, Any]]) -> Any:

@@ -100,18 +100,13 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
         x, held = facts.get(key), limits.get(limit)
         if x is None:
             continue
-        text = f"{x['value']:.5g} {unit} {place_text(x)}" + f", t = {x['t']:.5g} s" * moves
+        place = "from s = {:.5g} to {:.5g}".format(*x["s_range"]) if "s_range" in x else f"at s = {x['s']:.5g}"
+        text = f"{x['value']:.5g} {unit} {place} m" + f", t = {x['t']:.5g} s" * moves
         text += f", of {x['partner']}" if "partner" in x else ""
-        yield title, text + judged_text(held, unit, x) + unknown_text(facts, unit) * (unit != "N/m")
+        of = {"N": "tension", "m": "curvature"}.get(unit)  # whose error does not converge
+        yield title, text + judged_text(held, unit, x) + f"; {UNKNOWN}" * (of in facts["not_converged"])
     for x in facts["quantities"]:
         yield x["name"], x["text"] + x["when"] + x["ending"]
-
-
-def place_text(extreme: dict[str, Any]) -> str:
-    """Where an extreme is, in words."""
-    if "s_range" in extreme:
-        return "from s = {:.5g} to {:.5g} m".format(*extreme["s_range"])
-    return f"at s = {extreme['s']:.5g} m"
 
 
 def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any]) -> str:
@@ -125,11 +120,6 @@ def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any])
         return f"; within {held['limit']}"
     there = "" if (held["s"], held["t"]) == (extreme["s"], extreme["t"]) else f" at s = {held['s']:.5g} m"
     return f"; {held['limit']} of {held['allowed']:.5g} {unit} BROKEN{there}"
-
-
-def unknown_text(facts: dict[str, Any], unit: str) -> str:
-    """That the error of an extreme, N of tension or m of a bend radius, does not converge; "" where it does."""
-    return f"; {UNKNOWN}" * (("curvature" if unit == "m" else "tension") in facts["not_converged"])
 
 
 def _on_the_seabed(result: Result) -> dict[str, Any]:
@@ -154,13 +144,6 @@ def _is_anchor(result: Result, end: str) -> bool:
 
         return float(place[2] - bed_heights(result, place[:1], place[1:2])[0]) <= ANCHORED
     return float(place @ normal) - offset <= ANCHORED
-
-
-def search_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """How an equilibrium was found."""
-    yield "found by", facts["path"].replace("; ", "\n")
-    if facts["residual"] is not None:
-        yield "residual force", f"{facts['residual']:.2g} N at most"
 
 
 def ends_rows(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -296,9 +279,7 @@ def judged(table: TradeTable, row: Row) -> dict[str, Any]:
 
 def trade_table(table: TradeTable) -> Any:
     """The rows as a terminal has room for them."""
-
-    def part(value: float | None) -> str:
-        return "" if value is None else f"{100 * value:.2g} %"
+    from hybrid.studies.tradeoff import percent
 
     out = table_of(("run", "position", "end force", "cells", "steps", "CPU", ""), [], ("run", ""), ("",))
     front, best = table.front(), table.recommended
@@ -306,7 +287,7 @@ def trade_table(table: TradeTable) -> Any:
         remark = "recommended" if row == best else "Pareto front" if row in front else ""
         remark = ", ".join(x for x in (remark, "" if row.status == "done" else row.status, row.cause) if x)
         style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
-        figures = [part(row.position_part), part(row.end_force_part), str(row.cells or ""), str(row.steps or "")]
+        figures = [percent(row.position_part), percent(row.end_force_part), str(row.cells or ""), str(row.steps or "")]
         out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", remark, style=style)
     return out
 
@@ -408,7 +389,9 @@ def _show_lines(
         held, meetings = quantities_facts(result), [(x.t, x.text) for x in result.events if x.kind == TOUCH]
         meetings += [(x.t_force, f"{x.partner}: {x.text}") for x in result.contacts()]
     many = len(lines) > MOST_LISTED
-    rows = [*search_rows(search)] if search is not None else []
+    rows = [("found by", search["path"].replace("; ", "\n"))] if search is not None else []
+    if search is not None and search["residual"] is not None:
+        rows.append(("residual force", f"{search['residual']:.2g} N at most"))
     for name, facts in () if many else lines.items():
         rows += _rows_of_line(name, facts, end is not None)
     rows += ends_rows(search) if search is not None and "" in lines else []

@@ -15,7 +15,7 @@ from hybrid.designs.identify import Apart, Estimate, Measurements, fit, measurem
 from hybrid.designs.in_motion import refuse_edges
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers_and_results import scene_with, text_of_found
-from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
+from hybrid.designs.optimum import SETTLED, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import (
     NOTHING,
     Constraint,
@@ -209,19 +209,13 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
             "minimised are held up by no limit; give low and high of each unknown, another start, or more cells"
         )
     space, rows = problem.space, zip(problem.constraints, best.prices, strict=True)
-    at = [
-        AtBound(name, which, float(best.bounds[i, k]))
-        for i, name in enumerate(space.names)
-        for k, which in enumerate(("low", "high"))
-        if np.isfinite(best.bounds[i, k])
-    ]
     kept, common = (
         (_kept(c, price, point, finer) for c, price in rows),
         _common(task, asked, problem.equilibria, space, point, file),
     )
     least, before = (None if objective is None else objective.value(x) for x in (point, first))
     found = {"minimised": least, "minimised_at_start": before, "settled": settled, "notes": tuple(notes)} | common
-    return Found(kept=tuple(kept), bounds=tuple(at), **found)
+    return Found(kept=tuple(kept), bounds=_at_bounds(space, best.bounds), **found)
 
 
 def _ran_off(space: Space, k: int, point: Point) -> str:
@@ -252,24 +246,20 @@ def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identifie
     space, keys = space_of(task, asked, scenes)
     equilibria = Equilibria(scenes, keys, measured.wanted)
     point, found = fit(measured, equilibria, space)
-    edges = _at_bounds(space, point)
+    edges = _at_bounds(space, np.where(space.at_bounds(point.x), 0.0, np.nan))
     found["notes"] += tuple(
         f"{x.name} is at its bound ({x.which}): what was measured would have it beyond" for x in edges
     )
-    found |= {"measured": _places(measured, point), "bounds": tuple(edges)}
+    found |= {"measured": _places(measured, point), "bounds": edges}
     found |= {"histories": _histories(measured, equilibria.point_of(space.start), point)}
     found |= _common(task, asked, equilibria, space, point, file)
     return Identified(kept=(), minimised=None, minimised_at_start=None, **found)
 
 
-def _at_bounds(space: Space, point: Point) -> list[AtBound]:
-    """Unknowns at their bounds, where nothing has a price."""
-    sizes, out = space.sizes(point.x), []
-    for name, x, low, high, size in zip(space.names, point.x, space.low, space.high, sizes, strict=True):
-        out += [
-            AtBound(name, which, 0.0) for which, b in (("low", low), ("high", high)) if abs(x - b) <= AT_BOUND * size
-        ]
-    return out
+def _at_bounds(space: Space, prices: Floats) -> tuple[AtBound, ...]:
+    """Unknowns at their bounds, with the prices (n, 2) of these; NaN: not there."""
+    at = np.argwhere(np.isfinite(prices)).tolist()
+    return tuple(AtBound(space.names[i], ("low", "high")[k], float(prices[i, k])) for i, k in at)
 
 
 def _places(measured: Measurements, point: Point) -> dict[str, dict[str, Floats]]:
@@ -302,9 +292,7 @@ def _reached(problem: Problem) -> Optimum:
     """Where targets and limits are kept, where nothing is minimised."""
     point = reached(problem, problem.space.start)
     prices = [Price(is_active(c, point, problem.within), 0.0) for c in problem.constraints]
-    bounds = np.full((point.x.size, 2), np.nan)
-    for x in _at_bounds(problem.space, point):
-        bounds[problem.space.names.index(x.name), 0 if x.which == "low" else 1] = 0.0
+    bounds = np.where(problem.space.at_bounds(point.x), 0.0, np.nan)
     return Optimum(point, tuple(prices), bounds, 0.0, "")
 
 
@@ -326,11 +314,9 @@ def _refuse_what_fights(problem: Problem, point: Point) -> None:
         f"{point.values[c.row]:.6g}"
         for _, c in fights
     ]
-    space, sizes = problem.space, problem.space.sizes(point.x)
-    at = [
-        f"{name} = {x:.6g}{' (its bound)' if min(abs(x - low), abs(x - high)) <= AT_BOUND * size else ''}"
-        for name, x, low, high, size in zip(space.names, point.x, space.low, space.high, sizes, strict=True)
-    ]
+    edges = np.any(problem.space.at_bounds(point.x), axis=1)
+    named = zip(problem.space.names, point.x, edges, strict=True)
+    at = [f"{name} = {x:.6g}{' (its bound)' if edge else ''}" for name, x, edge in named]
     what = "these cannot all be kept" if len(fights) > 1 else "this cannot be kept"
     detail = f"{what}; closest result: " + "; ".join(told) + ", with " + ", ".join(at)
     raise ComputationError(Outcome.NOT_REACHED, None, None, detail)

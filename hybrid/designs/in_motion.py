@@ -436,6 +436,3 @@ def _alike(one: Sequence[Sequence[tuple[str, float]]], other: Sequence[Sequence[
         and all(abs(x - y) <= SAME_ZONE for (_, x), (_, y) in zip(a, b, strict=True))
         for a, b in zip(one, other, strict=True)
     )
-
-
-# Statistics of a history (outputs, places): an extreme is the largest of its peaks, each with when and where it is.

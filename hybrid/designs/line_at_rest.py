@@ -199,7 +199,8 @@ class LineAtRest:
             if self._tried.layers.size:
                 load_layers(self._line, here, self._tried, self._work)
                 batch.layers[k] = self._tried.layers
-        found = self._of_states(batch)
+        places = [(self._observer.s, self.model.line.s)] * batch.t.size
+        found = self._results(self._observer.values_of(self._observer.observation(batch)), places)
         return self._slopes(found[::2], found[1::2], steps)
 
     def by_scene(self, lines: Sequence[tuple[Beside, Floats]], steps: Floats) -> Floats:
@@ -287,11 +288,6 @@ class LineAtRest:
         small = np.take_along_axis(every, np.abs(every).argmin(axis=0)[None], axis=0)[0]
         rough = np.abs(above - below) > KINK * (np.abs(above) + np.abs(below)) + ROUGH * np.abs(self._values)
         return np.asarray(np.where(rough, small, mean) / steps[:, None])
-
-    def _of_states(self, batch: Batch) -> Floats:
-        """(n, W) of outputs of the line."""
-        places = [(self._observer.s, self.model.line.s)] * batch.t.size
-        return self._results(self._observer.values_of(self._observer.observation(batch)), places)
 
     def _output(self, x: Beside, report: Floats) -> Batch:
         """This state on a line."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from hybrid.designs.case_results import Equilibria, Point
@@ -17,6 +18,7 @@ from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 
 ROUNDS = 40  # at most
+AT_BOUND = 1e-6  # part of a bound's size within which an unknown is at it
 MET = 1e-8  # residuals below which all are met
 STEP = 0.3  # part of itself by which a number changes in a round, at most
 HALVED = 6  # times that a step is halved which does not lead nearer
@@ -38,6 +40,10 @@ class Space(NamedTuple):
         through = (self.low < 0.0) & (self.high > 0.0) | (x == 0.0)
         range_ = np.where(np.isfinite(self.high - self.low), self.high - self.low, np.maximum(np.abs(x), 1.0))
         return np.asarray(np.where(through, range_, np.abs(x)))
+
+    def at_bounds(self, x: Floats) -> NDArray[np.bool_]:
+        """Which unknowns at x are at their low and high (n, 2)."""
+        return np.abs(x[:, None] - np.stack([self.low, self.high], axis=1)) <= AT_BOUND * self.sizes(x)[:, None]
 
 
 class Rows(NamedTuple):
@@ -161,7 +167,8 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
         point = equilibria.point_of(x)
         return Rows(point, (point.values - goal) / scale, lambda: point.slopes / scale[:, None])
 
-    reached = nearest(off, signed(tuple(by), start))
+    low, high = np.where(start > 0.0, ((0.0,), (np.inf,)), ((-np.inf,), (0.0,)))  # each keeps its sign
+    reached = nearest(off, Space(tuple(by), start, low, high))
     numbers, results = reached.point.x, reached.point.values
     if float(np.abs(reached.values).max()) <= MET:
         found = dict(zip(targets, results.tolist(), strict=True))
@@ -172,8 +179,3 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
     detail = f"{list(targets)[worst]} comes to {results[worst]:.6g}, not {goal[worst]:.6g}, with {text}"
     first = "other numbers (--by) that it answers to, or a target nearer to what it is"
     raise ComputationError(Outcome.NOT_REACHED, None, None, detail, first=first)
-
-
-def signed(names: tuple[str, ...], start: Floats) -> Space:
-    """Unknowns that keep their signs."""
-    return Space(names, start, np.where(start > 0.0, 0.0, -np.inf), np.where(start > 0.0, np.inf, 0.0))

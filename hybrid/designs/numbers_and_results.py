@@ -61,8 +61,10 @@ def number_in(tables: Table, key: str) -> float:
         try:
             if isinstance(value, Table):
                 value = {name: getattr(value, name) for name in type(value).model_fields}
-            value = value[_index(part)] if isinstance(value, list | tuple) else value[part]
-        except (KeyError, IndexError, TypeError, ValueError):
+            elif isinstance(value, list | tuple):
+                value = {str(k): x for k, x in enumerate(value)}
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
             expected = "a key of the scene that has a number"
             raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")]) from None
     if not isinstance(value, float):
@@ -70,13 +72,6 @@ def number_in(tables: Table, key: str) -> float:
         kind = "a number that may change by a little" if isinstance(value, int) else "a number"
         raise SceneError([Complaint("by", key, f"{kind}, which {key} is not in this scene", "another key")])
     return float(value)
-
-
-def _index(part: str) -> int:
-    """Of a list, counted from 0; ValueError: it is written in another way."""
-    if part != str(abs(int(part))):
-        raise ValueError(part)
-    return int(part)
 
 
 def computing(key: str) -> str:

@@ -19,7 +19,6 @@ from hybrid.designs.problem import Constraint, Objective, Problem, Within
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 
-AT_BOUND = 1e-6  # part of a bound's size within which an unknown is at it
 ITERATIONS = 60  # steps of one search
 SEARCHES = 3
 # Part of slopes that no limit holds up, below which a search is not begun once more.
@@ -365,7 +364,6 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     own, first_sizes = space.sizes(point.x), space.sizes(space.start)
     sizes = np.maximum(own, first_sizes)  # of an unknown that goes to 0, where a part of itself changes nothing more
     gradient = objective.slopes(point) * sizes
-    at = np.stack([np.abs(point.x - space.low) <= AT_BOUND * own, np.abs(point.x - space.high) <= AT_BOUND * own], 1)
     columns, least, owners = [], list[float](), list[int]()
     for k, c in enumerate(constraints):  # a peak whose parabola is higher than that of the extreme holds it up, too
         values, slopes = peaks_of(c, point)
@@ -373,7 +371,7 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
             columns.append((c.side or 1) * slope * sizes)
             least.append(-np.inf if c.side == 0 else 0.0)
             owners.append(k)
-    edges = [(i, k) for i, k in np.argwhere(at).tolist()]
+    edges = [(i, k) for i, k in np.argwhere(space.at_bounds(point.x)).tolist()]
     for i, k in edges:
         columns.append(np.eye(sizes.size)[i] * (1.0 if k else -1.0) * sizes[i])
         least.append(0.0)

@@ -471,12 +471,6 @@ def outputs_of(problem: Problem, task: TaskFile[Design], scene: AnyScene) -> dic
 def _output(problem: Problem, rows: np.ndarray, scene: AnyScene, quantity: str) -> Output:
     wanted = [problem.equilibria.wanted[k] for k in rows]
     text = "; ".join(f"{result} ({case})" if case else result for case, result in wanted)
-    return Output(rows, unit_of_quantity(scene, quantity.split(".")[0]), text)
-
-
-def unit_of_quantity(scene: AnyScene, name: str) -> str:
-    """The unit of a quantity that is recorded of a scene, or of one of its own `output.quantities`."""
-    if name in PROBES:
-        return PROBES[name].unit
-    own = scene.output.quantities or {}
-    return own[name].unit if name in own else ""
+    name, own = quantity.split(".")[0], scene.output.quantities or {}  # of a scene, or of its output.quantities
+    unit = PROBES[name].unit if name in PROBES else own[name].unit if name in own else ""
+    return Output(rows, unit, text)

@@ -499,11 +499,6 @@ class File(NamedTuple):
     names: Sequence[str] | None
     line: str = ""
 
-    @property
-    def has_places(self) -> bool:
-        """Whether what is in it lies along a line."""
-        return bool(self.line or not self.result.lines)
-
 
 def files_of(result: Result, target: Path, kind: str, names: Sequence[str] | None) -> list[File]:
     """The files of an export; of several lines each has one.

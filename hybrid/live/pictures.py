@@ -43,7 +43,9 @@ def picture_of(text: str, file: str, compiling: Callable[[], None]) -> tuple[dic
         out["title"], out["moves"] = scene.title or "", scene.time is not None
         made = plan(scene)
         out["plan"] = _plan_rows(scene, made)
-        _begin_to_compile(scene, compiling)
+        if not is_warm(kernels_of(scene, True)):  # what an equilibrium calls is compiled once on a machine
+            compiling()
+            compile_beside(scene, static=True)
         result = equilibrium(scene, made)
     except SceneError as error:
         out["problems"] = [_refused(complaint) for complaint in located_in(error, text, file).complaints]
@@ -75,13 +77,6 @@ def equilibrium(scene: Scene, made: Any) -> Result:
     target = MemoryTarget()
     case.record(NetworkResolution.of(case.lines), target)
     return written_result(target)
-
-
-def _begin_to_compile(scene: Scene, compiling: Callable[[], None]) -> None:
-    """Begin to compile what an equilibrium calls, once on a machine; `compiling` hears of it beforehand."""
-    if not is_warm(kernels_of(scene, True)):
-        compiling()
-        compile_beside(scene, static=True)
 
 
 def _refused(complaint: Complaint) -> dict[str, Any]:

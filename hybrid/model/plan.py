@@ -5,7 +5,6 @@ For a scene that leaves the choice of the model: what each kind would cost, and 
 
 from __future__ import annotations
 
-import warnings
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import refuse_value
+from hybrid.errors import refuse_value, renamed
 from hybrid.kernels.laws.water import still_below
 from hybrid.kernels.state.report import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
 from hybrid.kernels.state.state import Floats
@@ -384,11 +383,7 @@ class Plan:
         """Names and plans of the lines: this is that of a line without a name."""
         return [("", self)]
 
-    @property
-    def ledger(self) -> tuple[Entry, ...]:
-        """Former name of `contents`."""
-        warnings.warn("ledger is now contents", DeprecationWarning, stacklevel=2)
-        return self.contents
+    ledger = renamed("ledger", "contents")
 
 
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from itertools import pairwise
+from itertools import groupby, pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
@@ -73,18 +73,12 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
 
     loads: arc lengths (m) of floats, clumps and the like: tension jumps there, and a catenary has a kink.
     """
-    whole: list[Zone] = []
-    for zone in zones:
-        if whole and whole[-1].kind == zone.kind:
-            whole[-1] = Zone(zone.kind, whole[-1].s_a, zone.s_b)
-        else:
-            whole.append(zone)
-    parts: list[Zone] = []
-    for zone in whole:
-        near = 1e-9 * whole[-1].s_b
-        kinks = [x for x in loads if zone.s_a + near < x < zone.s_b - near]
-        bounds = [zone.s_a, *kinks, zone.s_b]
-        parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
+    parts, near = list[Zone](), 1e-9 * zones[-1].s_b
+    for kind, same in groupby(zones, lambda zone: zone.kind):
+        first, *others = same
+        s_a, s_b = first.s_a, (others[-1] if others else first).s_b
+        bounds = [s_a, *(x for x in loads if s_a + near < x < s_b - near), s_b]
+        parts += [Zone(kind, a, b) for a, b in pairwise(bounds)]
     return tuple(parts)
 
 
@@ -162,21 +156,8 @@ class Grid:
 
     def moved(self, nodes_s: Floats, s: Floats) -> Grid:
         """The grid of the same stretches with nodes (N+1,) m elsewhere in them, and points s (ns,) m."""
-        other = Grid.__new__(Grid)
-        for name in (
-            "loads",
-            "changes",
-            "after",
-            "hinges",
-            "parts",
-            "spans",
-            "side_nodes",
-            "_cuts",
-            "_kept",
-            "_joints",
-            "_kinds",
-        ):
-            setattr(other, name, getattr(self, name))
+        other, made = Grid.__new__(Grid), ("_middles", "nodes", "cells", "chords", "held", "sides", "_grids")
+        other.__dict__ = {name: x for name, x in self.__dict__.items() if name not in made}
         other._put(nodes_s, s)
         return other
 
@@ -376,11 +357,6 @@ class ObservedStates:
     def stiffness(self, nodes: slice | NDArray[np.int64]) -> Floats:
         """Stiffness (n, 3, nb or 1) N m of the elements at nodes."""
         return np.moveaxis(self.batch.kb[:, nodes], 0, -1) if self.batch.kb.size else self.line.kb[nodes, :, None]
-
-    @property
-    def cell_lengths(self) -> Floats:
-        """(N, nb or 1) m, unstretched."""
-        return self.batch.h.T if self.batch.h.size else self.line.h[:, None]
 
     # ---- what was computed --------------------------------------------------------------------
 

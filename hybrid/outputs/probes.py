@@ -621,10 +621,6 @@ class Observer:
                 )
         return found
 
-    @property
-    def zone_rows(self) -> list[tuple[str, float, float]]:
-        return self.rows_of(self.zones)
-
     def rows_of(self, zones: Sequence[Zone]) -> list[tuple[str, float, float]]:
         """Zones as they stand in the file."""
         return [(z.kind, z.s_a, z.s_b) for z in zones]

@@ -475,7 +475,8 @@ class RunLine:
         self.observer.first_energy = there.first_energy
         if not self._moves:
             self._judge_rest(seen, values)
-        self.recorder.save_batch(batch.t.copy(), values, there.zone_rows, [there.rows_of(zones) for zones in more])
+        own, *beside = [there.rows_of(zones) for zones in (there.zones, *more)]
+        self.recorder.save_batch(batch.t.copy(), values, own, beside)
         if not self._moves:
             return
         stop = None

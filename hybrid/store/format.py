@@ -163,7 +163,7 @@ def add_fixed(file: h5py.File, fixed: Sequence[tuple[Field, np.ndarray]]) -> Non
             data.make_scale(field.name)
             data.dims[0].label = field.name
         else:
-            attach(data, field.dims, [file[d] for d in field.dims])
+            attach_scales(data.id, field.dims, [file[d].id for d in field.dims])
 
 
 def values_of_fixed(grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -183,10 +183,6 @@ def write_all(data: h5d.DatasetID, values: np.ndarray) -> None:
 def chunk_rows(size: int) -> int:
     """Rows of so many bytes in a chunk of a table that grows."""
     return max(1, _CHUNK_BYTES // max(size, 1))
-
-
-def attach(data: h5py.Dataset, dims: Sequence[str], scales: Sequence[h5py.Dataset]) -> None:
-    attach_scales(data.id, dims, [scale.id for scale in scales])
 
 
 def attach_scales(data: h5d.DatasetID, dims: Sequence[str], scales: Sequence[h5d.DatasetID]) -> None:

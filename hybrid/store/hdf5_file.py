@@ -14,7 +14,7 @@ import ctypes
 import io
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -221,7 +221,7 @@ class _Draft(io.RawIOBase):
 
 @contextmanager
 def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
-    """A new file that is made in one go; OSError when it could not be written."""
+    """A new file that is made in one go, or with "r+" one that nobody has opened; OSError: it could not be written."""
     with _Draft(path, f"{mode.rstrip('+')}+") as draft:
         with h5py.File(draft, mode, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS) as file:
             bound_metadata(file, _DRAFTED)
@@ -229,11 +229,6 @@ def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
         draft.put_all()
         if draft.error is not None:
             raise draft.error
-
-
-def redrafted(path: Path) -> AbstractContextManager[h5py.File]:
-    """A file that is there and that nobody else has opened, changed in one go; errors as of `drafted`."""
-    return drafted(path, "r+")
 
 
 def created(path: Path, make: Callable[[Path], None], many: bool = False) -> h5py.File:

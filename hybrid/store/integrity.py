@@ -21,6 +21,7 @@ names a class or a function, and no array is longer than the bytes that are ther
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import math
 import os
@@ -240,37 +241,25 @@ Tree = dict[str, Any]
 
 def pack(tree: Mapping[str, Any]) -> bytes:
     """A tree as bytes."""
-    arrays = _Arrays()
+    arrays = io.BytesIO()
     head = json.dumps(_plain(tree, arrays)).encode()
-    body = [len(head).to_bytes(8, "little"), head, *arrays.parts]
-    body.insert(0, (len(body[0]) + len(head) + arrays.size).to_bytes(8, "little"))
+    body: list[bytes | memoryview] = [len(head).to_bytes(8, "little"), head, arrays.getbuffer()]
+    body.insert(0, (len(body[0]) + len(head) + arrays.tell()).to_bytes(8, "little"))
     digest = hashlib.blake2b(digest_size=DIGEST)
     for part in body:
         digest.update(part)
     return b"".join([MAGIC, digest.digest(), *body])
 
 
-class _Arrays:
-    """Arrays whose bytes are one after the other, and the number of these so far."""
-
-    def __init__(self) -> None:
-        self.parts: list[Any] = []
-        self.size = 0
-
-    def add(self, part: np.ndarray) -> int:
-        """Where the part begins."""
-        at, self.size = self.size, self.size + part.nbytes
-        self.parts.append(part)
-        return at
-
-
-def _plain(x: Any, arrays: _Arrays) -> Any:
+def _plain(x: Any, arrays: io.BytesIO) -> Any:
     """What JSON can write; the bytes of arrays are added to `arrays`."""
     if isinstance(x, np.ndarray):
         name = x.dtype.newbyteorder("<").str
         if name not in DTYPES:
             raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
-        return {ARRAY: [name, list(x.shape), arrays.add(np.ascontiguousarray(x, name).reshape(-1).view("u1"))]}
+        at = arrays.tell()
+        arrays.write(np.ascontiguousarray(x, name).reshape(-1).view("u1").data)
+        return {ARRAY: [name, list(x.shape), at]}
     if isinstance(x, np.generic):
         return x.item()
     if isinstance(x, list | tuple):

@@ -41,10 +41,6 @@ class ComparisonRecorder:
         """Time of the last output, s."""
         return self.times[-1] if self.times else -np.inf
 
-    def save(self, t: float, values: Mapping[str, Any], zones: ZoneRows) -> None:
-        """Append an output at time t, s.  ResultError when it is not finite."""
-        self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
-
     def save_batch(
         self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: ZoneRows, later: Sequence[ZoneRows] = ()
     ) -> None:
@@ -69,9 +65,6 @@ class ComparisonRecorder:
     def _keep(self, values: Mapping[str, np.ndarray]) -> None:
         for name, value in values.items():
             self._kept.setdefault(name, []).append(np.asarray(value, float))
-
-    def log(self, values: Mapping[str, float | int]) -> None:
-        """Single steps are not kept."""
 
     def log_rows(self, rows: np.ndarray) -> None:
         """Append steps: rows of the log."""

@@ -244,6 +244,31 @@ def counts_of(status: Sequence[int] | np.ndarray) -> dict[str, int]:
     return {name: int((values == k).sum()) for name, k in (("done", DONE), ("failed", FAILED), ("left", OPEN))}
 
 
+def reasons_of(cases: xarray.Dataset) -> list[tuple[str, list[int]]]:
+    """Reasons of cases without place and time, those of most cases first, and numbers of these cases."""
+    found: dict[str, list[int]] = {}
+    for number, reason in zip(cases["case"].values.tolist(), cases["reason"].values.tolist(), strict=True):
+        found.setdefault(str(reason).split(" (t = ")[0], []).append(number)
+    return sorted(found.items(), key=lambda x: -len(x[1]))
+
+
+def ranges_of(cases: xarray.Dataset) -> list[dict[str, Any]]:
+    """Of each number that was kept: smallest, median and largest value of all cases, and the case of the largest."""
+    rows = []
+    for name in sorted(map(str, cases.data_vars)):
+        values = cases[name].values
+        if cases[name].dims != ("case",) or values.dtype.kind != "f" or name in OWN:
+            continue
+        row: dict[str, Any] = {"name": name, "unit": cases[name].attrs.get("units", "")}
+        row |= dict.fromkeys(("smallest", "median", "largest", "case"))
+        if np.isfinite(values).any():
+            worst = int(np.nanargmax(values))
+            row |= {"smallest": float(np.nanmin(values)), "median": float(np.nanmedian(values))}
+            row |= {"largest": float(values[worst]), "case": int(cases["case"].values[worst])}
+        rows.append(row)
+    return rows
+
+
 # What a study says of the accuracy that its scenes ask for: the verdict on each case, and which do not meet it.
 
 

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import csv
 import io
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, renamed
 from hybrid.statistics.extremes import THREE_HOURS
 from hybrid.statistics.moments import exceedance, summary
 from hybrid.store.capacity import CODE_NAME as CODE_USED
@@ -228,27 +227,8 @@ CHECK = "check"
 OF_DIFFERENCE = 0.5
 
 
-# What rows and tables were called in 0.5.
-_FORMER = {
-    name: name.replace("pull", "end_force")
-    for name in ("pull", "pull_part", "estimate_pull", "effectivity_pull", "largest_pull", "bound_pull")
-} | {"asked_for": "target"}
-
-
-class _Renamed:
-    """Attributes under their former names, with a warning."""
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            if name not in _FORMER or not hasattr(self, _FORMER[name]):
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            warnings.warn(f"{name} is now {_FORMER[name]}", DeprecationWarning, stacklevel=2)
-            return getattr(self, _FORMER[name])
-
-
 @dataclass(frozen=True)
-class Row(_Renamed):
+class Row:
     """One run.
 
     Errors are the largest over all outputs, lines and points (position) or both ends (end force); parts are of the
@@ -274,6 +254,10 @@ class Row(_Renamed):
     cpu: float | None = None  # s, of the whole process, from the scene to the result
     effort_cpu: float | None = None  # s, as the result says
     key: str = ""
+
+    pull, pull_part = renamed("pull", "end_force"), renamed("pull_part", "end_force_part")
+    estimate_pull = renamed("estimate_pull", "estimate_end_force")
+    effectivity_pull = renamed("effectivity_pull", "effectivity_end_force")
 
     @property
     def effectivity_position(self) -> float | None:
@@ -311,7 +295,7 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[bool]:
 
 
 @dataclass(frozen=True)
-class TradeTable(_Renamed):
+class TradeTable:
     """What was asked, what it is compared with, and the rows.
 
     bound_position (m), bound_end_force (N): what `target` comes to, None: it does not ask for that; of a part, for the
@@ -328,6 +312,9 @@ class TradeTable(_Renamed):
     notes: tuple[str, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()  # machine, date, versions, command
     missing: int = 0  # runs that an interruption has left undone
+
+    asked_for, bound_pull = renamed("asked_for", "target"), renamed("bound_pull", "bound_end_force")
+    largest_pull = renamed("largest_pull", "largest_end_force")
 
     @property
     def reference(self) -> Row:

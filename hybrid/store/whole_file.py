@@ -344,7 +344,7 @@ def write_result(
                 _write_at(file, at, data)
         return
     with drafted(path) as file:
-        _write_lines(file, contents, restart, outputs, complete)
+        _write_lines(file, contents, restart, outputs)
 
 
 def image_of_result(
@@ -357,7 +357,7 @@ def image_of_result(
     """
     if len(contents.parts) >= MOST_LINES:
         file = in_memory()
-        _write_lines(file, contents, restart, outputs, complete)
+        _write_lines(file, contents, restart, outputs)
         return image_of(file)
     image, placed = _image_of_few(contents, restart, outputs, complete)
     if not placed:
@@ -397,9 +397,7 @@ def _image_of_few(
     return image_of(file), [(at, np.ascontiguousarray(x[of]).tobytes()) for x, places in rows for at, of in places]
 
 
-def _write_lines(
-    file: h5py.File, contents: ArrayContents, restart: Restart | None, outputs: int | None, complete: bool
-) -> None:
+def _write_lines(file: h5py.File, contents: ArrayContents, restart: Restart | None, outputs: int | None) -> None:
     """Write a result of many lines, one after the other, to a new file."""
     bare = Bare(outputs, False)
     for k, (group, part) in enumerate(groups_of(contents), 1):

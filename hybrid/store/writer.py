@@ -63,7 +63,6 @@ from hybrid.store.hdf5_file import (
     names_in,
     of_all,
     of_part,
-    redrafted,
     replacing,
     root_of,
     unwritable,
@@ -155,7 +154,7 @@ def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], Non
     target = target.expanduser().resolve()
     with replacing(target, by_hdf5=True) as new:  # and then in its place: somebody may be reading
         copy_unsigned(target, new)
-        with redrafted(new) as file:
+        with drafted(new, "r+") as file:
             change(file)
         sign_new(new)
 

@@ -229,7 +229,9 @@ def cases_of(study: Study) -> Cases:
         raise SceneError([Complaint("only_if", str(study.only_if), "a condition that some case fulfils", "relax it")])
     settings = [f"{path}={json.dumps(rows[0][name])}" for name, paths in keys.items() for path in paths]
     read_text(text, study.scene, settings)  # refused with the names of the keys
-    rows = [_with_absolute_files(row, keys, Path(study.scene).parent) for row in rows]
+    of_files = {name for name, paths in keys.items() if any(re.search(r"\.(file|rao)$", path) for path in paths)}
+    for row in rows:
+        row |= {k: str((Path(study.scene).parent / row[k]).absolute()) for k in of_files if isinstance(row.get(k), str)}
     base = scene.model_dump(mode="json", exclude_none=True)
     bounds = {short[name]: (each.low, each.high) for name, each in study.vary.items() if each.low is not None}
     derived = {name: np.array(evaluated(f"derive.{name}", x, rows)) for name, x in study.derive.items()}
@@ -248,12 +250,6 @@ def _refuse_names(keys: Mapping[str, Sequence[str]], study: Study) -> None:
                 expected = f"a key of its own: {known[path]} sets it too"
                 raise SceneError([Complaint(f"vary.{name}", path, expected, "leave one of them out")])
             known[path] = name
-
-
-def _with_absolute_files(row: Row, keys: Mapping[str, Sequence[str]], folder: Path) -> Row:
-    """The same with names of files relative to the scene file made absolute."""
-    named = {name for name, paths in keys.items() if any(re.search(r"\.(file|rao)$", path) for path in paths)}
-    return {k: str((folder / v).absolute()) if k in named and isinstance(v, str) else v for k, v in row.items()}
 
 
 def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene:

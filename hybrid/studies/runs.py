@@ -243,10 +243,7 @@ class RunStore:
         return self.save(row, values)
 
     def _reporter(self, what: str) -> Callable[[Progress], None]:
-        def report_fraction(progress: Progress) -> None:
-            self.report(what, progress.fraction)
-
-        return report_fraction
+        return lambda progress: self.report(what, progress.fraction)
 
     def _warm_up(self, spec: RunSpec, scene: Scene) -> None:
         """Compile and load the kernels of a model; the result of this run is not used."""

@@ -136,7 +136,9 @@ class _Batches:
         while True:
             stuck = self._aside and self._computed  # what is computed waits for a batch that is aside: that one first
             while len(self.running) < most and not stuck and (k := next(left, None)) is not None:
-                self._send(k)
+                future = self._client.submit(compute_batch, self._job_of(k), pure=False)
+                self.running[future] = k
+                self._waiting.add(future)
             if self.running:
                 self._receive(next(self._waiting))
             elif self._aside:
@@ -144,11 +146,6 @@ class _Batches:
                 self._keep(k, self._one_by_one(self._job_of(k)))
             else:
                 return
-
-    def _send(self, k: int) -> None:
-        future = self._client.submit(compute_batch, self._job_of(k), pure=False)
-        self.running[future] = k
-        self._waiting.add(future)
 
     def _receive(self, future: Any) -> None:
         """Take what a batch has come to."""

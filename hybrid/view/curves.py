@@ -43,11 +43,6 @@ class Along(NamedTuple):
         found = result.both_sides(name)[1]
         return found if found.shape[-1] == len(self.s) else found[..., self.points]
 
-    def side(self, k: int) -> int:
-        """Of the k-th place -1 or 1, on the left or on the right of a jump; else 0."""
-        s = self.s
-        return int(k > 0 and s[k - 1] == s[k]) - int(k + 1 < len(s) and s[k + 1] == s[k])
-
 
 def extent(result: Result, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
     """Arc lengths (n,), lowest and highest value there with a gap at jumps, and of what: every step, or every output.

@@ -388,8 +388,3 @@ def _limits(axis: Axis, items: Sequence[Item], name: str) -> tuple[float, float]
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
     return low, high
-
-
-def changes_sign(low: float, high: float) -> bool:
-    """Whether zero is well inside an axis, and worth a line."""
-    return low < -0.1 * (high - low) < 0.1 * (high - low) < high

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from hybrid.store.reader import Result
-from hybrid.view.curves import Kept, Store, along, worst, worst_first
+from hybrid.view.curves import Kept, Store, along, even, worst, worst_first
 from hybrid.view.figure import (
     BED,
     BODY,
@@ -227,7 +227,7 @@ def shape(result: Result, every: AllLines, view: View) -> Panel:
     """The last shapes over some earlier ones, in grey."""
     items = sea(every.as_result, view)
     times = telling_times(every.as_result)
-    times = times[np.unique(np.linspace(0, len(times) - 1, min(len(times), _EARLIER)).round().astype(int))]
+    times = times[even(len(times), _EARLIER)]
     for k, t in enumerate(times):
         output = int(np.abs(every.times - t).argmin())
         label = "earlier shapes (later: darker)"

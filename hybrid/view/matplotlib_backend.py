@@ -49,7 +49,6 @@ from hybrid.view.figure import (
     Panel,
     Rule,
     Text,
-    changes_sign,
     check_target,
     colour_of,
     prefix,
@@ -164,7 +163,7 @@ def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[st
             artist.set_zorder((0.1 if behind else 1.0) + 0.001 * k + 0.0001 * n)
         if isinstance(item, Map):
             images[item.name] = artists[0]
-    if panel.grid and not free and changes_sign(bottom, top):
+    if panel.grid and not free and bottom < -0.1 * (top - bottom) and 0.1 * (top - bottom) < top:  # 0 is well inside
         ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=0.9)
     if panel.aspect is not None:
         # Of its limits matplotlib may cut what is not data; water and sand reach farther and do not count.

@@ -28,6 +28,7 @@ from hybrid.store.obstacle_surfaces import (
 )
 from hybrid.store.reader import Result
 from hybrid.store.records import Zone
+from hybrid.view.curves import even
 from hybrid.view.figure import STONE, STONE_EDGE, Area, Item, Line, short
 
 Numbers = Sequence[float] | np.ndarray
@@ -168,10 +169,7 @@ def extent_in(view: View, result: Result) -> np.ndarray:
     box = line_extent_in(view, result)
     room, out = _NEAR * float(np.ptp(box, axis=1).max()), np.cross(view.across, view.up)
     far = box + room * np.array([[-1.0, 1.0]])
-    outputs = np.unique(
-        np.linspace(0, len(result.position) - 1, min(len(result.position), _SHAPES)).round().astype(int)
-    )
-    for body in (x for k in outputs for x in obstacles_at(result, int(k))):
+    for body in (x for k in even(len(result.position), _SHAPES) for x in obstacles_at(result, int(k))):
         endless = not np.isfinite(body.half) and abs(float(body.axis @ out)) < ALONG
         if body.kind == PLANE or endless:
             continue
@@ -234,7 +232,7 @@ def not_to_scale(view: View, result: Result) -> str:
 
 def _crosses_itself(shape: np.ndarray) -> bool:
     """Whether a polyline (n, 2) crosses itself."""
-    p = shape[np.unique(np.linspace(0, len(shape) - 1, min(len(shape), _CROSSING_POINTS)).round().astype(int))]
+    p = shape[even(len(shape), _CROSSING_POINTS)]
     step = np.diff(p, axis=0)
 
     def side(a: np.ndarray, along: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -339,21 +337,9 @@ def _half_plane(body: Body, view: View, box: np.ndarray, size: float) -> np.ndar
 
 def hull(points: np.ndarray) -> np.ndarray:
     """The convex hull (m, 2) of points (n, 2), counter-clockwise."""
-    order = points[np.lexsort(points.T[::-1])]
+    from scipy.spatial import ConvexHull
 
-    def chain(rows: np.ndarray) -> list[np.ndarray]:
-        kept: list[np.ndarray] = []
-        for p in rows:
-            while len(kept) > 1 and _left(kept[-2], kept[-1], p) <= 0.0:
-                kept.pop()
-            kept.append(p)
-        return kept[:-1]
-
-    return np.array(chain(order) + chain(order[::-1]))
-
-
-def _left(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    return np.asarray(points[ConvexHull(points).vertices])
 
 
 # ---- in space -----------------------------------------------------------------------------------------

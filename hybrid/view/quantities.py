@@ -177,14 +177,9 @@ def _history(result: Result, name: str, at: Any, times: Any) -> History:
     if name in result and result.dims(name) == ("t", "s", "xyz"):
         fix = "x, y or z" if name == "position" else "a quantity of one component"
         raise ResultError(f"'{name}' has three components at every place\n    try:      {fix}")
-    return history_of(result, name, times, _places(result, name, at))
-
-
-def _places(result: Result, name: str, at: Any) -> Any:
-    """Arc lengths whose histories are drawn: those asked for, else the ends and the middle."""
-    if at is not None or not lies_along(result, name):
-        return at
-    return result.s[[0, len(result.s) // 2, -1]] if len(result.s) > 2 else result.s
+    if at is None and lies_along(result, name):  # the ends and the middle
+        at = result.s[[0, len(result.s) // 2, -1]] if len(result.s) > 2 else result.s
+    return history_of(result, name, times, at)
 
 
 def _columns(result: Result, name: str, values: np.ndarray, s: Any) -> tuple[np.ndarray, list[str]]:

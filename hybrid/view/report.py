@@ -50,22 +50,6 @@ from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges
 from hybrid.view.panels import shape as shape_of_line
 from hybrid.view.plotly_backend import NARROW, draw, figure_of
 from hybrid.view.projections import free_edges, history_points
-from hybrid.view.report_parts import (
-    caption_html,
-    events_html,
-    figure_html,
-    filled_page,
-    footer,
-    packed,
-    page_file,
-    plot_html,
-    plotly_script,
-    section,
-    settings_html,
-    space_html,
-    table_html,
-    verdict_html,
-)
 from hybrid.view.summary import Fact, amount, attention, facts_of, length_of, limits_of_lines
 from hybrid.view.zones import shares, strip, zone_map
 
@@ -227,9 +211,11 @@ def bundle(figure: Figure, with_script: bool) -> dict[str, Any]:
     """The figure as Jupyter's front ends take it, and as HTML; with_script: plotly.js is in the HTML."""
     data = json.loads(figure.to_json()) | {"config": CONFIG}
     name = f"hybrid-{uuid4().hex}"
-    script = page_file("notebook.js").replace("__FIGURE__", script_json(data)).replace("__NAME__", name)
+    script = parts.page_file("notebook.js").replace("__FIGURE__", script_json(data)).replace("__NAME__", name)
     if with_script:
-        script = page_file("unpack.js").replace("__PACKED__", packed(plotly_script().encode())) + script
+        script = (
+            parts.page_file("unpack.js").replace("__PACKED__", parts.packed(parts.plotly_script().encode())) + script
+        )
     page = f'<div id="{name}" style="height:{HEIGHT}px;width:100%;background:#fff"></div><script>{script}</script>'
     return {MIME: data, "text/html": page, "text/plain": "the cable in space, a figure of plotly"}
 
@@ -490,24 +476,24 @@ def html(result: Result, modes: Any = None) -> str:
     figures = [figure_of(panel, store) for group in panels.values() for panel in group]
     numbers = iter(range(len(figures)))
     numbered = {name: [(next(numbers), panel) for panel in group] for name, group in panels.items()}
-    parts = {  # in the order of the contents
+    page = {  # in the order of the contents
         "title": escape(result.title or "(no title)"),
         "subtitle": escape("; ".join(_subtitle(result, every))),
-        "verdict": verdict_html(facts, several),
+        "verdict": parts.verdict_html(facts, several),
         "facts": facts_and_tables(result, every, facts),
         "cable": _space(result, every, scene, shown) if scene else "",
-        "figures": _graphs(every, numbered) + (section(modes) if modes is not None else ""),
+        "figures": _graphs(every, numbered) + (parts.section(modes) if modes is not None else ""),
         "statistics": statistics_of_all(result, every),
-        "events": events_html(result, several),
+        "events": parts.events_html(result, several),
         "energy": _energy(every.alone, numbered["energy"]) if every.alone is not None else "",
-        "settings": settings_html(result),
+        "settings": parts.settings_html(result),
         "scene": escape(result.scene_text),
         "scene_title": "Scene as it was run (YAML)",
-        "footer": escape(footer()),
+        "footer": escape(parts.footer()),
         "mark": REPORT_MARK,
         "index": script_json({"scene": scene, "figures": figures}),
     }
-    return filled_page(parts, store)
+    return parts.filled_page(page, store)
 
 
 def _subtitle(result: Result, every: AllLines) -> list[str]:
@@ -587,7 +573,7 @@ def _space(result: Result, every: AllLines, scene: dict[str, Any], shown: dict[s
         caption = f"{title}, {span}; on paper the last shape over earlier ones."
     else:
         caption = f"{title}: its equilibrium."
-    section = space_html(scene, poster, moves, thinned.notice, caption)
+    section = parts.space_html(scene, poster, moves, thinned.notice, caption)
     return section if alone is not None else section.replace("<h2>The cable</h2>", "<h2>The lines</h2>")
 
 
@@ -597,7 +583,9 @@ def _graphs(every: AllLines, groups: dict[str, list[tuple[int, Panel]]]) -> str:
     if groups["zones"] and line is not None:
         out += f'<section id="zones"><h2>Zones over time</h2><p class="quiet">{escape(shares(line))} '
         out += '<span class="screen">Point at a mark, or tap it, to read what happened.</span></p>'
-        out += "".join(f"<figure>{plot_html(k, f)}{caption_html(k, f)}</figure>" for k, f in groups["zones"])
+        out += "".join(
+            f"<figure>{parts.plot_html(k, f)}{parts.caption_html(k, f)}</figure>" for k, f in groups["zones"]
+        )
         out += "</section>"
     explained = "Lowest, mean and highest of all outputs, and now: the time of the slider."
     if line is not None and every.outputs < 2:
@@ -610,7 +598,7 @@ def _graphs(every: AllLines, groups: dict[str, list[tuple[int, Panel]]]) -> str:
         ("ranges", "Along the cable" if line is not None else "Along the lines", explained, more),
     ):
         if groups[name]:
-            figures = "".join(figure_html(k, f) for k, f in groups[name])
+            figures = "".join(parts.figure_html(k, f) for k, f in groups[name])
             out += f'<section id="{name}"><h2>{title}</h2><p class="quiet">{text}</p>'
             out += f'<div class="grid">{figures}</div>{below}</section>'
     return out
@@ -646,10 +634,10 @@ def _energy(result: Result, figures: list[tuple[int, Panel]]) -> str:
         ["" if name.startswith("all ") else group, name, amount(y, "J") if abs(y) > 1e-12 * peak else "0"]
         for group, name, y in rows
     ]
-    graphs = f'<div class="grid">{"".join(figure_html(k, f) for k, f in figures)}</div>' if figures else ""
+    graphs = f'<div class="grid">{"".join(parts.figure_html(k, f) for k, f in figures)}</div>' if figures else ""
     note = "The last line of work, “scheme”, is what no work accounts for: the time scheme's own." if works else ""
     return (
         f'<section id="energy"><h2>Energy</h2>{graphs}<details{"" if figures else " open"}><summary>The energy balance '
-        f'at the last output</summary><p class="quiet">{note}</p>{table_html(cells, ["", "of", "J"], 1)}'
+        f'at the last output</summary><p class="quiet">{note}</p>{parts.table_html(cells, ["", "of", "J"], 1)}'
         "</details></section>"
     )

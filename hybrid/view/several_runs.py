@@ -21,7 +21,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.store.envelope import BROKEN, NOT_VERIFIED
 from hybrid.store.reader import Result
-from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study, unmet_accuracy
+from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study, ranges_of, reasons_of, unmet_accuracy
 from hybrid.store.tables import OURS, Row, TradeTable
 from hybrid.store.verdicts import section_limits
 from hybrid.view import report_parts as parts
@@ -55,16 +55,6 @@ from hybrid.view.figure import (
 from hybrid.view.panels import RANGES, end_force, only_line
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import views_of
-from hybrid.view.report_parts import (
-    footer,
-    grid_of,
-    oblique_view,
-    packed,
-    page_file,
-    page_of,
-    plotly_script,
-    table_html,
-)
 from hybrid.view.summary import amount, length_of
 from hybrid.view.zones import warnings_of
 
@@ -321,7 +311,7 @@ def _design_page(found: Any) -> Page:
     histories = getattr(found, "histories", ())
     for history in histories:
         panels[str(len(panels))] = _history(history, str(len(panels)))
-    mosaic, size = grid_of(panels, COLUMNS, WIDE, HIGH, 0.8)
+    mosaic, size = parts.grid_of(panels, COLUMNS, WIDE, HIGH, 0.8)
     changes = [f"{name} {short(found.start[name], 4)} → {short(x, 4)}" for name, x in found.numbers.items()]
     more = f", and {len(changes) - NUMBERS} more" if len(changes) > NUMBERS else ""
     facts = ", ".join(changes[:NUMBERS]) + more
@@ -361,7 +351,7 @@ def _view(places: Any) -> tuple[Any, str]:
     flat = places[:, :2] - places[:, :2].mean(axis=0)
     _, sizes, axes = np.linalg.svd(flat, full_matrices=False)
     if sizes[1] > FLAT * sizes[0]:
-        return oblique_view({"": places}), ""
+        return parts.oblique_view({"": places}), ""
     along = axes[0] * np.sign(axes[0][np.abs(axes[0]).argmax()] or 1.0)
     angle = math.degrees(math.atan2(along[1], along[0]))
     name = "x" if abs(angle) < 1.0 else "y" if abs(angle - 90.0) < 1.0 else f"horizontal, {short(angle, 3)}° from x"
@@ -383,11 +373,7 @@ def html(study: Path) -> str:
     """The page as text."""
     found = open_study(study)
     variables = [name for name in json.loads(found.attrs["variables"]) if name in found]
-    results = sorted(
-        str(name)
-        for name in found.data_vars
-        if found[name].dims == ("case",) and name not in (*OWN, "status") and found[name].dtype.kind == "f"
-    )
+    results = [x["name"] for x in ranges_of(found)]
     columns = {"case": _column(found, "case")} | {name: _column(found, name) for name in variables}
     columns["status"] = {"unit": "", "description": "", "values": [STATUS[int(k)] for k in found["status"].values]}
     columns |= {name: _column(found, name) for name in (*results, *OWN) if name in found}
@@ -395,22 +381,22 @@ def html(study: Path) -> str:
     again = f"hybrid study {study.name} --case 0 -o case0.h5"
     data = {"columns": columns, "variables": variables, "results": results, "texts": texts, "again": again}
     counts = counts_of(found["status"].values)
-    parts = {
+    page = {
         "title": escape(str(found.attrs["title"])),
         "subtitle": escape(_subtitle(found, counts)),
         "failures": _failures(found) + _accuracy(found),
-        "ranges": _ranges(found, results),
+        "ranges": _ranges(found),
         "shares": _shares(found),
         "example": escape(_example(found, variables)),
         "again": escape(again),
-        "footer": escape(footer()),
+        "footer": escape(parts.footer()),
         "mark": REPORT_MARK,
-        "css": page_file("report.css") + page_file("study.css"),
-        "js": page_file("study.js"),
-        "data": packed(json.dumps(data, allow_nan=False).encode()),
-        "plotly": packed(plotly_script().encode()),
+        "css": parts.page_file("report.css") + parts.page_file("study.css"),
+        "js": parts.page_file("study.js"),
+        "data": parts.packed(json.dumps(data, allow_nan=False).encode()),
+        "plotly": parts.packed(parts.plotly_script().encode()),
     }
-    return page_of("study.html", parts)
+    return parts.page_of("study.html", page)
 
 
 def _column(found: Any, name: str) -> dict[str, Any]:
@@ -442,12 +428,9 @@ def _failures(found: Any) -> str:
 def _reasons(found: Any, failed: np.ndarray, what: str) -> str:
     if not failed.any():
         return ""
-    reasons: dict[str, list[int]] = {}
-    for number, reason in zip(found["case"].values[failed].tolist(), found["reason"].values[failed], strict=True):
-        reasons.setdefault(str(reason).split(" (t = ")[0], []).append(number)
     rows = "".join(
         f"<li><b>{len(numbers)} case{'s' * (len(numbers) > 1)}</b>, such as {numbers[0]}: {escape(text)}</li>"
-        for text, numbers in sorted(reasons.items(), key=lambda item: -len(item[1]))
+        for text, numbers in reasons_of(found.isel(case=failed))
     )
     return f'<div class="attention" role="alert"><h2>{int(failed.sum())} {what}</h2><ul>{rows}</ul></div>'
 
@@ -458,39 +441,36 @@ def _accuracy(found: Any) -> str:
     return f'<div class="attention" role="alert"><h2>Accuracy asked</h2><ul>{rows}</ul></div>' if rows else ""
 
 
-def _ranges(found: Any, results: list[str]) -> str:
+def _ranges(found: Any) -> str:
     rows = []
-    for name in results:
-        values = found[name].values
-        if np.isfinite(values).any():
-            worst = found["case"].values[int(np.nanargmax(values))]
-            figures = (np.nanmin(values), np.nanmedian(values), np.nanmax(values))
-            about = (str(found[name].attrs.get(key, "")) for key in ("long_name", "units"))
-            rows.append([name, *about, *(f"{x:.5g}" for x in (*figures, worst))])
-    return table_html(rows, ("", "what it is", "unit", "smallest", "median", "largest", "in case"), numbers=4)
+    for x in ranges_of(found):
+        if x["case"] is not None:
+            figures = (f"{x[key]:.5g}" for key in ("smallest", "median", "largest", "case"))
+            rows.append([x["name"], str(found[x["name"]].attrs.get("long_name", "")), x["unit"], *figures])
+    return parts.table_html(rows, ("", "what it is", "unit", "smallest", "median", "largest", "in case"), numbers=4)
 
 
 def _shares(found: Any) -> str:
     """What `hybrid.shares` has found of results: a table of each, or why it claims nothing."""
-    parts = []
+    tables = []
     for name, each in json.loads(found.attrs.get("shares", "{}")).items():
         heads = ("", "derivative", "share", "first order from", "to", "Sobol: first order", "total")
         keys = ("derivative", "share", "low", "high", "first", "total")
         rows = [[x["variable"], *("" if x[k] != x[k] else f"{x[k]:.4g}" for k in keys)] for x in each["rows"]]
         about = f"R² {each['r2']:.4f} over {each['cases']} cases"
         about = f"No shares: {escape(each['why'])}." if each["why"] else f"{escape(each['of'])} at the mean; {about}."
-        table = table_html(rows, heads, numbers=len(keys))
-        parts.append(f'<h3>{escape(name)}</h3><p class="quiet">{about}</p>{table}')
-    if not parts:
+        table = parts.table_html(rows, heads, numbers=len(keys))
+        tables.append(f'<h3>{escape(name)}</h3><p class="quiet">{about}</p>{table}')
+    if not tables:
         return ""
-    return f'<section id="shares"><h2>Shares of the spread, by derivatives</h2>{"".join(parts)}</section>'
+    return f'<section id="shares"><h2>Shares of the spread, by derivatives</h2>{"".join(tables)}</section>'
 
 
 def _example(found: Any, variables: list[str]) -> str:
     """A filter that could be meant."""
     numbers = [name for name in variables if found[name].dtype.kind == "f"]
-    parts = [f"{name} > {float(np.nanmedian(found[name].values)):.4g}" for name in numbers[:2]]
-    return " and ".join(parts) or "failed"
+    terms = [f"{name} > {float(np.nanmedian(found[name].values)):.4g}" for name in numbers[:2]]
+    return " and ".join(terms) or "failed"
 
 
 # The page of a tradeoff study: error against CPU time, a line for every model.

@@ -31,7 +31,7 @@ from hybrid.store.verdicts import Doubt, accuracy_text, asked_accuracy, doubt_of
 from hybrid.view.curves import Along, Worst, along, held_loop, trapped_loop, worst
 from hybrid.view.figure import NEWS, ZERO, prefix, short
 from hybrid.view.projections import STILL, free_edges
-from hybrid.view.zones import warnings_of
+from hybrid.view.zones import extent_of, warnings_of
 
 HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
@@ -109,11 +109,6 @@ def moment(result: Result, t: float) -> str:
     return f", t = {short(t, 5)} s" if len(result.times) > 1 else ""
 
 
-def _output_and_point(values: np.ndarray, k: int) -> tuple[int, int]:
-    """Output and point of the k-th value of an array (nt, ns)."""
-    return divmod(k, values.shape[1])
-
-
 # ---- one function per fact ------------------------------------------------------------------------
 
 
@@ -125,13 +120,7 @@ def _warnings(result: Result) -> list[Fact]:
         more = f" ({count} times; this is the first)" if count > 1 else ""
         of_run = is_of_the_run(event.kind, event.t)
         at = "" if of_run or len(result.times) < 2 else f"At t = {short(event.t, 5)} s, "
-        where = (
-            f"s = {short(event.s_a, 4)} m: "
-            if event.s_a == event.s_b
-            else f"s = {short(event.s_a, 4)} to {short(event.s_b, 4)} m: "
-        )
-        if of_run and event.s_a < event.s_b:
-            where = ""  # all of the line
+        where = "" if of_run and event.s_a < event.s_b else f"{extent_of(event)}: "  # of all of the line
         text = f"{at}{where}{event.text}{more}"
         weight = "note" if event.kind in NEWS else "alarm"
         values = {"kind": event.kind, "count": count}
@@ -183,16 +172,16 @@ def _with_limit(result: Result, limit: str, fact: Fact) -> Fact:
     return fact
 
 
-def _error(result: Result, name: str, found: Worst) -> float | None:
-    """The estimated error at the output and place nearest to a value; None where the file has none."""
-    error = along(result, name).of(result, f"errors/total/{name}")
-    return None if error is None or error.ndim != 2 else float(error[found.output, found.place])
-
-
 def _doubt(result: Result, name: str, found: Worst) -> str:
-    error = _error(result, name, found)
-    unknown = name in not_converged_in(result.attributes)
-    return "" if error is None else f" ({UNKNOWN if unknown else f'± {amount(error, result.units[name], 2)}'})"
+    """The estimated error at the output and place nearest to a value, of curvature as a part; "": the file has none."""
+    each = along(result, name).of(result, f"errors/total/{name}")
+    if each is None or each.ndim != 2:
+        return ""
+    if name in not_converged_in(result.attributes):
+        return f" ({UNKNOWN})"
+    error = float(each[found.output, found.place])
+    part = f"{short(100 * error / found.value, 2)} %" if name == "curvature" else amount(error, result.units[name], 2)
+    return f" (± {part})"
 
 
 def _bend(result: Result) -> Fact:
@@ -214,7 +203,7 @@ def _bend(result: Result) -> Fact:
         stiff = "" if kind == "rod" else ", which does not resist bending"
         inside = f", in a {kind} zone{stiff}" if kind else ""
         text = f"{amount(1.0 / found.value, 'm')} {place(result, found.s)}{moment(result, found.t)}{inside}"
-        doubt = _doubt_of_radius(result, found)
+        doubt = _doubt(result, "curvature", found)
         text += f"{doubt}."
         values["headline"] = f"{amount(1.0 / found.value, 'm')}{doubt}"
         place_of = (found.t, found.s)
@@ -247,12 +236,6 @@ def _kind_at(result: Result, found: Worst) -> str:
     if not found.side and "rod" in kinds:
         return "rod"
     return kinds[-1 if found.side > 0 else 0] if kinds else ""
-
-
-def _doubt_of_radius(result: Result, found: Worst) -> str:
-    error = _error(result, "curvature", found)
-    unknown = "curvature" in not_converged_in(result.attributes)
-    return "" if error is None else f" ({UNKNOWN if unknown else f'± {short(100 * error / found.value, 2)} %'})"
 
 
 def _compressed(tension: Along, zero: float) -> tuple[float, int]:
@@ -386,13 +369,13 @@ def _hockling(result: Result) -> Fact:
     ratio, loops = np.where(without[:, None], ratio, 0.0), f" {loops}" * bool(loops)
     pressed, pressing = _not_in_tension(result, tension)
     if not ratio.any():
-        i, k = _output_and_point(torque, int(np.abs(torque).argmax()))
+        i, k = divmod(int(np.abs(torque).argmax()), torque.shape[1])
         text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, "
         small = "needs next to no tension to keep the cable straight." if pressed else "is far too small for loops."
         text += f"{'was judged at no output without a loop.' if not without.any() else small}{pressing}{loops}"
         values = {"torque": abs(float(torque[i, k])), "needed": float(needed.max()), "ratio": 0.0}
         return Fact("hockling", title, f"{text} {HOCKLING}.", "note" if pressed or loops else "plain", values)
-    i, k = _output_and_point(ratio, int(ratio.argmax()))
+    i, k = divmod(int(ratio.argmax()), ratio.shape[1])
     t, s = float(result.times[i]), float(found.s[k])
     fields = {"torque": torque, "needed": needed, "tension": tension.values, "ratio": ratio}
     values = {name: float(x[i, k]) for name, x in fields.items()}

@@ -368,15 +368,16 @@ def _events(events: Sequence[Event]) -> list[Item]:
     return items
 
 
+def extent_of(event: Event) -> str:
+    """Where it was, in words."""
+    to = "" if event.s_a == event.s_b else f" to {short(event.s_b, 4)}"
+    return f"s = {short(event.s_a, 4)}{to} m"
+
+
 def _event_lines(event: Event) -> list[str]:
     """An event in words, line by line."""
-    where = (
-        f"s = {short(event.s_a, 4)} m"
-        if event.s_a == event.s_b
-        else f"s = {short(event.s_a, 4)} to {short(event.s_b, 4)} m"
-    )
     energy = [] if event.energy is None else [f"energy put in: {short(event.energy, 3)} J"]
-    return [event.kind, f"t = {short(event.t, 5)} s, {where}", *wrap(event.text, _WIDE)[:12], *energy]
+    return [event.kind, f"t = {short(event.t, 5)} s, {extent_of(event)}", *wrap(event.text, _WIDE)[:12], *energy]
 
 
 def warnings_of(result: Result) -> list[tuple[Event, int]]:
