@@ -86,7 +86,7 @@ def self_reach(scene: LineScene) -> SelfReach:
     why = next((text for text, holds in off.items() if holds), "")
     if why:
         return SelfReach(False, False, why)
-    slack, least = slack_of(scene), least_slack(scene)
+    slack, least = slack_of(scene), LOOP * min(x.diameter or math.inf for x in scene.cable.sections)
     if slack <= least:
         return SelfReach(False, False, f"the slack of {max(slack, 0.0):.3g} m is less than {least:.3g} m, of a loop")
     much = "whatever its ends do" if math.isinf(slack) else f"a slack of {slack:.3g} m, and a loop takes {least:.3g} m"
@@ -116,11 +116,6 @@ def slack_of(scene: LineScene) -> float:
     if any(x.prescribed_motion or x.release or not x.is_placed for x in scene.ends.both):
         return math.inf
     return scene.length - math.dist(a, b)
-
-
-def least_slack(scene: LineScene) -> float:
-    """The slack, m, that two points take to meet which are no neighbours along the line: that of the smallest loop."""
-    return LOOP * min(x.diameter or math.inf for x in scene.cable.sections)
 
 
 def contact_bits(scene: LineScene) -> int:

@@ -473,7 +473,10 @@ class DrivenEnd:
         if velocity is None:
             if record[IMPLIED] and not one_step:
                 path[SPEED:THERE] = 0.0
-            velocity = self._implied(*before) if one_step else STILL
+            velocity = STILL
+            if one_step:  # at the end of the parabola through three places: by trapezoids velocities add up to the way
+                (mean, dt), (earlier, took) = self._mean_velocity(), before  # of the way before, 0 s: it stood still
+                velocity = np.asarray(mean + (mean - np.asarray(earlier)) * (dt / (dt + (took or dt))))
             record[:] = 0.0
             record[IMPLIED] = one_step
         numbers[SPEED_THERE], numbers[SPEED_THERE + 1], numbers[SPEED_THERE + 2] = velocity
@@ -490,15 +493,6 @@ class DrivenEnd:
         p = self.path
         dt = float(p[TO] - p[FROM])
         return ((p[THERE:SPEED_THERE] - p[AT:SPEED]) / dt, dt) if dt > 0.0 else (STILL, 0.0)
-
-    def _implied(self, before: Vector, earlier: float) -> Floats:
-        """Velocity (3,) m/s at the end of the parabola through the last three places.
-
-        before: mean velocity (3,) m/s of the way before this one, earlier: s, how long that took; 0: it stood still.
-        By trapezoids the velocities of a motion from rest to rest add up to its way.
-        """
-        mean, dt = self._mean_velocity()
-        return np.asarray(mean + (mean - np.asarray(before)) * (dt / (dt + (earlier or dt))))
 
     def _compare(self) -> None:
         """Count how far the places, and the velocities that are given, go in this step."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -124,16 +125,9 @@ def dead_loads(line: Line) -> Floats:
     return loads
 
 
-def _heights_of(bed: Seabed) -> Callable[[Floats, Floats], Floats]:
+def _heights_of(bed: Seabed) -> Callable[..., Any]:
     """Heights (n,) m of the bed at places x, y (n,) m."""
-
-    def heights(x: Floats, y: Floats) -> Floats:
-        if bed.depths is None:
-            rise_x, rise_y = bed.slope or (0.0, 0.0)
-            return np.asarray(bed.z + rise_x * x + rise_y * y)
-        return np.array([bed.height(*place) for place in zip(x.tolist(), y.tolist(), strict=True)])
-
-    return heights
+    return bed.height if bed.depths is None else np.vectorize(bed.height, otypes=[float])
 
 
 def hung(scene: LineScene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hanging | None:

@@ -38,7 +38,6 @@ from hybrid.kernels.state.state import (
     NO_BEND_LAW,
     NO_LAW,
     NO_PLANE,
-    NO_TABLE,
     NO_TORSION,
     NO_WAKE_LAW,
     TENSION_TORQUE,
@@ -217,18 +216,14 @@ def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:
 
 def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Floats]:
     """`law` and `law_table` of a line with cells of lengths h (N,) m on pieces `of` (N,)."""
-    if material.curves is None:
-        return NO_LAW, NO_TABLE
     law, rows, begin = np.zeros((h.size, NO_LAW.shape[1])), [], 0
-    for k, piece in enumerate(material.curves):
+    for k, piece in enumerate(material.curves or ()):
         cells = of == k
         if piece is None or not cells.any():
             continue
-        strain, tension = np.array(piece.rows, float).T
-        energy = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(strain) * (tension[1:] + tension[:-1]))])
-        rows.append(np.column_stack([strain, tension, energy]))
-        law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic, *piece.working, *piece.creep)
-        begin += strain.size
+        rows.append(_with_energy(piece.rows))
+        law[cells, :SHIFT] = (begin, begin + len(piece.rows), *piece.dynamic, *piece.working, *piece.creep)
+        begin += len(piece.rows)
     return law, np.concatenate(rows)
 
 
@@ -260,16 +255,12 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
         if spring < np.inf:  # as many columns when the clamp is let go
             widths.append(sum(map(len, layers[of[-k]])) + EACH)
         if rows[-k] and spring < np.inf:
-            rows[-k] += [0.0, give_of(spring, float(material.B[of[-k], :2].max()) / (0.5 * line.h[-k])), 0.0, 0.0]
+            half = float(material.B[of[-k], :2].max()) / (0.5 * line.h[-k])  # N m/rad, of half a cell there
+            rows[-k] += [0.0, 1.0 / max(spring, NO_SPRING * half), 0.0, 0.0]
     law = np.zeros((line.s.size, max(widths)))
     for i, row in enumerate(rows):
         law[i, : len(row)] = row
     return line._replace(slip_law=law, slip_now=np.zeros_like(law))
-
-
-def give_of(spring: float, half: float) -> float:
-    """How an angular spring (N m/rad) at a clamp turns, rad per N m; half: N m/rad, of half a cell there."""
-    return 1.0 / max(spring, NO_SPRING * half)
 
 
 def _of_table(material: Material, piece: int) -> list[Layer]:
@@ -286,8 +277,6 @@ def _of_table(material: Material, piece: int) -> list[Layer]:
 
 def bend_law(material: Material, line: Line, of: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """`bend_law` and `bend_table` of a line whose cells are of pieces `of` (N,) of a material."""
-    if material.bends is None:
-        return NO_BEND_LAW, NO_TABLE
     known: dict[Curve, int] = {}
     number = np.array([known.setdefault(x, len(known)) for x in _each_piece(material)])[of]
     begins = np.cumsum([0, *map(len, known)])
@@ -301,7 +290,7 @@ def bend_law(material: Material, line: Line, of: NDArray[np.int64]) -> tuple[Flo
     same = np.concatenate([[False], number[1:] == number[:-1], [False]])
     law[same, HALF_A] += law[same, HALF_B]
     law[same, FIRST_B : HALF_B + 1] = 0.0
-    plain = np.array([x is None for x in material.bends])[of]
+    plain = np.array([x is None for x in material.bends or ()])[of]
     without = np.concatenate([[True], plain]) & np.concatenate([plain, [True]])
     mixed = np.array([False, *(material.meet(a, b) for a, b in pairwise(of)), False])
     law[without | mixed | (line.element == 0)] = 0.0
@@ -320,7 +309,7 @@ def _each_piece(material: Material) -> list[Curve]:
 
 
 def _with_energy(rows: Curve) -> Floats:
-    """Rows of `Line.bend_table`: curvature, moment, energy per length."""
+    """Rows of `Line.bend_table`: curvature, moment, energy per length; of `law_table`: strain, tension, energy."""
     x, M = np.array(rows, float).T
     out = np.column_stack([x, M, np.zeros(x.size)])
     out[1:, ENERGY] = np.cumsum(0.5 * np.diff(x) * (M[1:] + M[:-1]))

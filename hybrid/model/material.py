@@ -31,7 +31,6 @@ from hybrid.model.sections import (
     attached,
     attachments_at,
     bending_stiffness,
-    damping,
     mean_compliance,
     merged_sections,
     pressing,
@@ -387,12 +386,12 @@ def _bare(scene: LineScene, bounds: Floats, of: list[Section]) -> Material:
         out.curves = [stretch_law(x) for x in of]
     if any(x.tension_torque for x in of):
         out.tension_torque = np.array([x.tension_torque or 0.0 for x in of])
-    if any(damping(x).mass for x in of):
+    if any(x.damped.mass for x in of):
         out.bits |= MASS_DAMPING
-        out.damp = np.array([x.mass * damping(x).mass for x in of])
-    if any(damping(x).stiffness for x in of):
+        out.damp = np.array([x.mass * x.damped.mass for x in of])
+    if any(x.damped.stiffness for x in of):
         out.bits |= STIFFNESS_DAMPING
-        out.tau = np.array([damping(x).stiffness for x in of], float)
+        out.tau = np.array([x.damped.stiffness for x in of], float)
     return out
 
 
@@ -448,16 +447,16 @@ def _points(out: Material, scene: LineScene) -> None:
     """Floats, clumps and end bodies; bodies at one place are one."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     rho = fluid.density if fluid else 0.0
-    everything = list(attachments_at(scene))
-    length = scene.length
+    everything, length = list(attachments_at(scene)), scene.length
     at: list[float] = []
-    for x, _ in sorted(everything, key=lambda pair: pair[0]):
+    for x in sorted(s for s, _ in everything):
         if not at or x - at[-1] > 1e-9 * length:
             at.append(min(x, length))
     out.at = np.array(at)
     out.lift = np.zeros(len(at))
     out.points = {name: np.zeros(len(at)) for name in POINT}
-    for i, (_, body) in zip(_nearest(out.at, [x for x, _ in everything]), everything, strict=True):
+    for x, body in everything:
+        i = np.searchsorted(out.at, x, "right") - 1
         out.points["point_mass"][i] += body.mass
         out.lift[i] -= gravity * body.mass
         if fluid is None:
@@ -481,13 +480,3 @@ def _points(out: Material, scene: LineScene) -> None:
     asked = ["point_drag", "point_added", "point_buoy"] + (["point_displaced"] if out.bits & WAVES else [])
     if any(out.points[name].any() for name in asked):
         out.bits |= BODIES
-
-
-def _nearest(places: Floats, wanted: list[float]) -> list[int]:
-    """Of `places` (P,), rising, that which is nearest to each of those wanted; the first of two as near."""
-    if not wanted:
-        return []
-    x = np.array(wanted, float)
-    right = np.clip(np.searchsorted(places, x), 0, places.size - 1)
-    left = np.maximum(right - 1, 0)
-    return np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right).tolist()

@@ -56,7 +56,9 @@ def nearby(
     those of `of` count as unchanged.
     """
     reaches_more = bool(obstacle_bits(scene) & ~(model.line.bits | without))
-    if model.payout is not None or reaches_more or (_turned_by_shape(model) and not clamped):
+    # both ends hold twist, and the scene leaves its plane: the frame of an end hangs on the first shape
+    hangs = all(model.cable.held_twist) and bool(model.line.element.any()) and model.plane is None
+    if model.payout is not None or reaches_more or (hangs and not clamped):
         return _built(model, scene, resolution)
     cable = material(scene)
     placed = _cells(model, cable, of, scene, resolution)
@@ -108,11 +110,6 @@ def _axes(tangent: Sequence[float] | Floats, first: Floats) -> Floats:
     """(3, 3) axes in columns, of a tangent of any length and the first director, which is normal to it."""
     t = np.asarray(tangent, float) / np.linalg.norm(tangent)
     return np.column_stack([first, np.cross(t, first), t])
-
-
-def _turned_by_shape(model: Model) -> bool:
-    """Whether the frame of an end hangs on the first shape: both hold twist, and the scene leaves its plane."""
-    return all(model.cable.held_twist) and bool(model.line.element.any()) and model.plane is None
 
 
 def _sea(model: Model, of: LineScene, scene: LineScene) -> Surroundings:
@@ -353,15 +350,9 @@ def carry_directors(line: Line, chords: Floats, a: Floats, state: State) -> None
 
 def _smooth(r: Floats, s: Floats, at: Floats) -> Floats:
     """Cubics through the nodes with the slopes of parabolas."""
-    h, d = np.diff(s), np.diff(r, axis=0) / np.diff(s)[:, None]
-    slope = np.empty_like(r)
-    slope[1:-1] = (h[1:, None] * d[:-1] + h[:-1, None] * d[1:]) / (h[:-1] + h[1:])[:, None]
-    slope[0], slope[-1] = 2.0 * d[0] - slope[1], 2.0 * d[-1] - slope[-2]
-    j = np.clip(np.searchsorted(s, at, side="right") - 1, 0, h.size - 1)
-    x, H = ((at - s[j]) / h[j])[:, None], h[j][:, None]
-    a, b = r[j], r[j + 1]
-    out = (1 + 2 * x) * (1 - x) ** 2 * a + x * (1 - x) ** 2 * H * slope[j]
-    return np.asarray(out + x * x * (3 - 2 * x) * b + x * x * (x - 1) * H * slope[j + 1])
+    from scipy.interpolate import CubicHermiteSpline  # slow to import
+
+    return np.asarray(CubicHermiteSpline(s, r, np.gradient(r, s, axis=0, edge_order=2))(at))
 
 
 # --- what may break, and the network after it --------------------------------------------------

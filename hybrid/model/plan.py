@@ -314,14 +314,10 @@ def step_time(
     each *= USUAL_ITERATIONS
     waves = scene.environment.waves
     if waves is not None:
-        each += COST_WAVE * waves.waves_in_sum * total * _stirred(model)
+        stirred = float(np.mean(model.start.r[:, 2] > still_below.py_func(model.sea.values)))  # below no wave is summed
+        each += COST_WAVE * waves.waves_in_sum * total * stirred
     each += COST_AS_RODS * total * as_rods
     return each + COST_STEP + (COST_MANAGER + COST_CRITERIA * total) * moves
-
-
-def _stirred(model: Model) -> float:
-    """Part of the nodes of the first shape that waves reach; below them no wave is summed up."""
-    return float(np.mean(model.start.r[:, 2] > still_below.py_func(model.sea.values)))
 
 
 def processor_time(scene: LineScene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:
@@ -445,11 +441,6 @@ def output_times(scene: LineScene) -> list[float]:
     return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
-def count_steps(scene: LineScene) -> int:
-    """Steps of a run (a load that stops, or `output.exact`, may add some); where they follow the motion: the least."""
-    return parts(scene.require_time().duration, first_resolution(scene).step)
-
-
 @dataclass(frozen=True)
 class NetworkPlan:
     """What lines require: the plan of each line by name, and what they come to together."""
@@ -527,7 +518,7 @@ def _plan(scene: LineScene) -> Plan:
     steps, step = 0, 0.0
     if scene.time:
         resolution = first_resolution(scene)
-        steps = foretold_steps(scene, model, resolution, count_steps(scene))
+        steps = foretold_steps(scene, model, resolution, parts(scene.time.duration, resolution.step))
         step = min(resolution.step, scene.time.duration / steps)
     outputs = scene.time.duration / scene.output_interval if scene.time else 0.0
     paid = model.payout.forecast(scene.time.duration) if model.payout is not None and scene.time else None
@@ -578,16 +569,9 @@ def critical_torque(scene: LineScene, model: Model, T: Floats) -> CriticalTorque
     if line.tension_twist.size:
         of_tension = float(2.0 * line.tension_twist @ T / np.sum(line.h / cable.B[cable.piece(middle), 2]))
     at = middle[k : k + 1]
-    radius = limits_along(scene, at).get("min_bend_radius", np.full(1, np.nan))
-    return CriticalTorque(
-        float(torque[k]),
-        float(at[0]),
-        float(T[k]),
-        float(EI[k]),
-        float(outer_diameter(scene, at)[0]),
-        float(radius[0]),
-        of_tension,
-    )
+    radius = float(limits_along(scene, at).get("min_bend_radius", np.full(1, np.nan))[0])
+    there = float(torque[k]), float(at[0]), float(T[k]), float(EI[k]), float(outer_diameter(scene, at)[0]), radius
+    return CriticalTorque(*there, of_tension)
 
 
 def apart(stops: Iterable[float], t: float, step: float) -> list[float]:

@@ -166,11 +166,6 @@ class RequestedAccuracy:
         }
         return asked.get(name, self.tension or self.of_end_force) is not None
 
-    @property
-    def text(self) -> str:
-        """In words."""
-        return self.describe()
-
     def describe(self, reach: Reach | None = None, used: Mapping[str, float] | None = None, rests: bool = False) -> str:
         """In words; reach: how far the line moves; used: how much of the limits, by name; None: not known.
 

@@ -135,27 +135,17 @@ def surroundings(scene: LineScene, cells: int) -> Surroundings:
     if scene.obstacles:
         boxes, facets, _ = facet_tables(scene.obstacles)
         sea = sea._replace(obstacles=obstacle_rows(scene), boxes=boxes, facets=facets)
-        if not (bed is not None and rubs(bed)):
-            sea = sea._replace(
-                friction=np.zeros(2), slip_length=1.0
-            )  # of the bed: friction of obstacles is in their rows
+        if not rubs(bed):  # of the bed: friction of obstacles is in their rows
+            sea = sea._replace(friction=np.zeros(2), slip_length=1.0)
     around = Surroundings(sea._replace(ramps=np.array([current_ramp or 0.0, wave_ramp or 0.0])), tuple(scene.obstacles))
-    return _moved(scene, cells, around)
-
-
-def _moved(scene: LineScene, cells: int, around: Surroundings) -> Surroundings:
-    """The same with the motions of obstacles."""
     sea = around.values
     courses = courses_of(scene, sea.obstacles, around.waves_of_vessels, float(sea.ramps[1]), around.elevation)
     if not courses.carried.size:
         return around
     grip = np.zeros((cells + 1, EACH * len(sea.obstacles)))
     rolling = np.zeros((2 * int((courses.carried[:, INERTIA] > 0.0).sum()), cells + 1, 5))
-    return Surroundings(
-        sea._replace(courses=courses.moves, carried=courses.carried, grip=grip, rolling=rolling),
-        around.names,
-        courses.driven,
-    )
+    sea = sea._replace(courses=courses.moves, carried=courses.carried, grip=grip, rolling=rolling)
+    return Surroundings(sea, around.names, courses.driven)
 
 
 def rubs(bed: Seabed | None) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.scene.analysis import RodZone, Straight, ZonesModel
 from hybrid.scene.attachments import BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
-from hybrid.scene.cable import Damping, Section
+from hybrid.scene.cable import Section
 from hybrid.scene.ends import Body
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import LineScene
@@ -106,13 +106,6 @@ def rotary_inertia(section: Section) -> tuple[float, float]:
             else (0.0, 0.0)
         )
     return given if isinstance(given, tuple) else (given, 2.0 * given)
-
-
-def damping(section: Section) -> Damping:
-    d = section.damping
-    if d is None:
-        return Damping()
-    return d if isinstance(d, Damping) else Damping(mass=d)
 
 
 def weight(section: Section, scene: LineScene) -> float:

@@ -222,7 +222,13 @@ class BendStiffener(Spread):
             if given:
                 why = "nothing, because added_stiffness says how stiff it is"
                 yield [Finding((given[0],), why, "leave one of the two out; modules over the same range have mass")]
-            self._rows_cover_the_range()
+            length, at = self.range[1] - self.range[0], [x for x, _ in self.added_stiffness]
+            if not all(a < b for a, b in pairwise(at)):
+                fix = "sort the rows, and leave double ones out"
+                yield [Finding(("added_stiffness",), "arc lengths that rise", fix)]
+            if at[0] != 0.0 or abs(at[-1] - length) > 1e-9 * self.range[1]:
+                expected = f"rows from 0 to {length:.8g} m, the length of the range"
+                yield [Finding(("added_stiffness",), expected, "arc lengths are counted from the start of the range")]
             return
         lacks = {key: unit for key, unit in cone.items() if getattr(self, key) is None}
         number = "a number ({}), or added_stiffness"
@@ -233,15 +239,6 @@ class BendStiffener(Spread):
         if min(self.diameters) < self.bore:
             expected = f"at least the bore, {self.bore:g} m, at both ends"
             yield [Finding(("diameters",), expected, "give outer diameters, in m")]
-
-    def _rows_cover_the_range(self) -> None:
-        rows, length = self.added_stiffness or (), self.range[1] - self.range[0]
-        at = [x for x, _ in rows]
-        if not all(a < b for a, b in pairwise(at)):
-            refuse([Finding(("added_stiffness",), "arc lengths that rise", "sort the rows, and leave double ones out")])
-        if at[0] != 0.0 or abs(at[-1] - length) > 1e-9 * self.range[1]:
-            expected = f"rows from 0 to {length:.8g} m, the length of the range"
-            refuse([Finding(("added_stiffness",), expected, "arc lengths are counted from the start of the range")])
 
 
 def _volume_in(attachment: Float | Modules, density: float, gravity: float) -> float:

@@ -232,18 +232,11 @@ def _not_tiny(value: float) -> float:
 
 def _a_whole_number(value: Any) -> int:
     value = unwrap(value)
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != value or value != math.floor(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or value % 1 != 0:  # not of nan and inf either
         raise PydanticCustomError("whole_number", "a whole number is needed")
     if abs(value) > LARGEST_COUNT:
         raise PydanticCustomError("large_number", "the number is too large", {"most": LARGEST_COUNT})
     return int(value)
-
-
-def _no_infinity(value: Any) -> Any:
-    """Infinity has no floor; say so before `_a_whole_number` asks for it."""
-    if isinstance(value, float) and math.isinf(value):
-        raise PydanticCustomError("whole_number", "a whole number is needed")
-    return value
 
 
 def numbers(n: int) -> Callable[[Any], Any]:
@@ -310,7 +303,7 @@ Text = Annotated[str, Field(strict=True), After(_one_line), Words("one line of t
 Number = Annotated[float, Before(_a_number), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0), After(_not_tiny)]
 NonNegative = Annotated[Number, Field(ge=0), After(_not_tiny)]
-Whole = Annotated[int, Before(_a_whole_number), Before(_no_infinity)]
+Whole = Annotated[int, Before(_a_whole_number)]
 Truth = Annotated[bool, Before(_a_truth)]
 Vector = Annotated[tuple[Number, Number, Number], Before(numbers(3)), Words("three numbers [x, y, z]")]
 Direction = Annotated[
@@ -336,6 +329,11 @@ def cross(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple
 def unit(a: tuple[float, float, float]) -> tuple[float, float, float]:
     length = math.hypot(*a)
     return (a[0] / length, a[1] / length, a[2] / length)
+
+
+def xyz(v: Any) -> str:
+    """A place or a vector, for people."""
+    return f"[{v[0]:.8g}, {v[1]:.8g}, {v[2]:.8g}]"
 
 
 def turned(angles: tuple[float, float, float], vector: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -7,9 +7,10 @@ the body.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
@@ -216,22 +217,14 @@ SixBySix = Annotated[
     _Diagonal(),
     Words("six numbers (surge, sway, heave, roll, pitch, yaw), or six rows of six"),
 ]
-Matrix = Sequence[Sequence[float]]
+Matrix = NDArray[np.float64]
 
 
-def no_pivot(matrix: Matrix, least: float) -> bool:
-    """Whether a symmetric matrix has a pivot below `least` times its largest number: it is not positive definite."""
-    rows, n = [list(row) for row in matrix], len(matrix)
-    big = max(abs(x) for row in rows for x in row)
-    for k in range(n):
-        pivot = rows[k][k]
-        if pivot < least * big or (pivot <= 0.0 and any(abs(rows[i][k]) > 1e-12 * big for i in range(k + 1, n))):
-            return True
-        for i in range(k + 1, n):
-            f = rows[i][k] / pivot if pivot > 0.0 else 0.0
-            for j in range(k, n):
-                rows[i][j] -= f * rows[k][j]
-    return False
+def mass_about(mass: float, place: ArrayLike, inertia: Triple = (0.0, 0.0, 0.0)) -> Matrix:
+    """(6, 6) about the origin of a mass (kg) at a place (m) with moments of inertia (kg m^2) about axes through it."""
+    c, E = np.array(place), np.eye(3)
+    arm = -mass * np.cross(E, c)
+    return np.block([[mass * E, arm], [arm.T, np.diag(inertia) + mass * (c @ c * E - np.outer(c, c))]])
 
 
 def without_turns(motion: Motion) -> Motion | None:
@@ -368,19 +361,10 @@ class FreeBody(Table):
         return Free(force=self.force, moment=self.moment)
 
     @property
-    def mass_matrix(self) -> list[list[float]]:
+    def mass_matrix(self) -> Matrix:
         """(6, 6) of mass, inertia and added mass about the origin, axes of the body."""
-        m, (x, y, z), I = self.mass, self.centre, self.inertia
-        M = [[m if i == j < 3 else 0.0 for j in range(6)] for i in range(6)]
-        offset = ((0.0, m * z, -m * y), (-m * z, 0.0, m * x), (m * y, -m * x, 0.0))
-        square, c = x * x + y * y + z * z, (x, y, z)
-        for i in range(3):
-            for j in range(3):
-                M[i][3 + j] = M[3 + j][i] = offset[i][j]
-                M[3 + i][3 + j] = (I[i] + m * square if i == j else 0.0) - m * c[i] * c[j]
-        if self.added_mass is not None:
-            M = [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(M, self.added_mass, strict=True)]
-        return M
+        M = mass_about(self.mass, self.centre, self.inertia)
+        return M if self.added_mass is None else M + np.array(self.added_mass)
 
     def _check_floats_or_is_submerged(self) -> Findings:
         if self.volume and self.hydrostatics is not None:
@@ -395,20 +379,18 @@ class FreeBody(Table):
             )
             yield [Finding(("inertia",), expected, "check which axis is which, and the units")]
         for key, given_in in (("added_mass", "kg"), ("damping", "N s/m")):
-            matrix: Matrix | None = getattr(self, key)
-            if matrix is None:
+            if getattr(self, key) is None:
                 continue
-            big = max(max(abs(x) for row in matrix for x in row), 1e-300)
-            worst = max((abs(matrix[i][j] - matrix[j][i]), i, j) for i in range(6) for j in range(i))
-            if key == "added_mass" and worst[0] > SYMMETRIC * big:
-                _, i, j = worst
+            matrix = np.array(getattr(self, key))
+            big, uneven = max(np.abs(matrix).max(), 1e-300), np.abs(np.tril(matrix - matrix.T))
+            if key == "added_mass" and uneven.max() > SYMMETRIC * big:
+                i, j = np.argwhere(uneven == uneven.max())[-1].tolist()
                 expected = f"a symmetric matrix; here row {i + 1}, column {j + 1} and its mirror image differ"
-                yield [Finding((key, i, j), expected, f"{matrix[j][i]:g} ({given_in}), or the mean of both")]
-            even = [[0.5 * (matrix[i][j] + matrix[j][i]) for j in range(6)] for i in range(6)]
-            if key == "damping" and no_pivot(even, -1e-9):
+                yield [Finding((key, i, j), expected, f"{matrix[j, i]:g} ({given_in}), or the mean of both")]
+            if key == "damping" and np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0] < -1e-9 * big:
                 expected = "a matrix that takes energy, whatever the velocity: no negative eigenvalue"
                 yield [Finding((key,), expected, "check signs and units", "a matrix that gives energy")]
-        if no_pivot(self.mass_matrix, 1e-12):
+        if np.linalg.eigvalsh(self.mass_matrix)[0] < 1e-12 * np.abs(self.mass_matrix).max():
             expected = "a matrix that leaves, with the mass, some inertia to every motion"
             given = "a matrix that leaves none"
             yield [Finding(("added_mass",), expected, "check signs, units and the order surge to yaw", given)]

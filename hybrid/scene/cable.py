@@ -20,7 +20,6 @@ from hybrid.scene.base import (
     Table,
     Vector,
     number_or_list,
-    refuse,
 )
 from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.section_laws import (
@@ -393,6 +392,11 @@ class Section(Table):
     )
 
     @property
+    def damped(self) -> Damping:
+        """Its damping, of nothing where none is given."""
+        return self.damping or Damping()
+
+    @property
     def anisotropic(self) -> bool:
         """Whether the two bending stiffnesses differ, so that the material axes matter."""
         return isinstance(self.bending_stiffness, tuple) and self.bending_stiffness[0] != self.bending_stiffness[1]
@@ -530,8 +534,20 @@ class Section(Table):
         if self.creep is not None and self.curve is None:
             expected = "an axial_stiffness or tension_strain beside it: what does not stretch does not creep"
             yield [Finding(("creep",), expected, "add `axial_stiffness: ...` (N)")]
-        if self.syrope is not None:
-            self._remembers(self.syrope)
+        if self.syrope is not None:  # whose curves depend on the highest mean tension
+            for key in ("axial_stiffness", "tension_strain"):
+                if getattr(self, key) is not None:
+                    expected = "nothing, because syrope says how it stretches"
+                    yield [Finding((key,), expected, "leave one of the two out")]
+            last = self.syrope.rows[-1][0]
+            if self.max_strain is not None and self.max_strain > last:
+                expected = f"at most the strain of the last row of syrope.curve, {last:g}"
+                yield [Finding(("max_strain",), expected, "leave it out, or add rows there")]
+            fault = self.syrope.first_fault(dynamic) if dynamic is not None else None
+            if dynamic is None:
+                fix = "add `dynamic_stiffness: {constant: ..., relaxation_time: ...}`"
+                yield [Finding(("dynamic_stiffness",), "a table, because syrope remembers the mean tension", fix)]
+            yield [fault[1]] if fault is not None else []
             return
         if dynamic is None:
             return
@@ -544,22 +560,6 @@ class Section(Table):
                 expected = f"more than the largest static stiffness, {stiffest:.6g} N"
                 fix = "a rope answers stiffer to what is fast; are the two exchanged?"
                 yield [Finding(("dynamic_stiffness", "constant"), expected, fix)]
-
-    def _remembers(self, syrope: Syrope) -> None:
-        """Refuse what does not go with curves that depend on the highest mean tension."""
-        for key in ("axial_stiffness", "tension_strain"):
-            if getattr(self, key) is not None:
-                refuse([Finding((key,), "nothing, because syrope says how it stretches", "leave one of the two out")])
-        last = syrope.rows[-1][0]
-        if self.max_strain is not None and self.max_strain > last:
-            expected = f"at most the strain of the last row of syrope.curve, {last:g}"
-            refuse([Finding(("max_strain",), expected, "leave it out, or add rows there")])
-        if self.dynamic_stiffness is None:
-            fix = "add `dynamic_stiffness: {constant: ..., relaxation_time: ...}`"
-            refuse([Finding(("dynamic_stiffness",), "a table, because syrope remembers the mean tension", fix)])
-        else:
-            fault = syrope.first_fault(self.dynamic_stiffness)
-            refuse([fault[1]] if fault is not None else [])
 
     def _check_one_law_of_bending(self) -> Findings:
         if self.moment_curvature is None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any, Protocol
+from typing import Any
 
 from hybrid.scene import combinations, motion_checks, sea_checks, start_checks
 from hybrid.scene.analysis import (
@@ -28,10 +28,10 @@ from hybrid.scene.analysis import (
     Time,
     ZonesModel,
 )
-from hybrid.scene.base import Finding, Pair, Place
+from hybrid.scene.base import Finding, Place
 from hybrid.scene.bodies import Carried
 from hybrid.scene.cable import Cable, Contact, Environment, Section
-from hybrid.scene.ends import Clamped, Ends, Free, Payout, Pinned
+from hybrid.scene.ends import Ends, Free
 from hybrid.scene.obstacles import Obstacles, SheaveObstacle
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
@@ -40,28 +40,21 @@ from hybrid.scene.start_checks import SAME_LENGTH
 # Contradictions between a line that is paid out and the rest of its scene.
 
 
-def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
-    """The end at which line is paid out, by name, and how; the last one of two."""
-    found = None
-    for name, end in ends.named().items():
-        if isinstance(end, Pinned | Clamped) and end.payout is not None:
-            found = name, end, end.payout
-    return found
+def _reels(ends: Ends) -> list[tuple[str, tuple[Section, ...]]]:
+    """What is on the reel from which line is paid out, by the name of the end."""
+    paid = [(name, getattr(end, "payout", None)) for name, end in ends.named().items()]
+    return [(name, payout.reel or ()) for name, payout in paid if payout is not None]
 
 
 def reel_has_diameters(
     environment: Environment, ends: Ends, contact: Contact, obstacles: Obstacles
 ) -> Iterator[Finding]:
     """Contact of the line with itself and with obstacles, and soil, know the diameters on the reel."""
-    found = _winch(ends)
-    if found is None:
-        return
-    name = found[0]
     soil = environment.seabed is not None and environment.seabed.soil is not None
-    if contact.self or obstacles or soil:
+    for name, reel in _reels(ends)[-1:] if contact.self or obstacles or soil else ():
         apart = "which parts of the cable keep apart (contact.self)"
         how = apart if contact.self else "with which it touches obstacles" if obstacles else "needed for soil"
-        yield from without_diameter(getattr(ends, name).payout.reel or (), ("ends", name, "payout", "reel"), how)
+        yield from without_diameter(reel, ("ends", name, "payout", "reel"), how)
 
 
 def without_diameter(sections: Iterable[Section], at: Place, why: str) -> Iterator[Finding]:
@@ -170,16 +163,11 @@ OF_A_REEL = {
 }
 
 
-def _damping_of_stiffness(section: Section) -> float:
-    return section.damping.stiffness if section.damping is not None else 0.0
-
-
 def _laws_on_a_reel(cable: Cable, ends: Ends) -> Iterator[Finding]:
     """Sections on a reel that stretch, or bend, by another table than that at the winch."""
-    paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
-    for name in paid:
+    for name, reel in _reels(ends):
         own = cable.sections[0 if name == "start" else -1]
-        for i, section in enumerate(getattr(ends, name).payout.reel or ()):
+        for i, section in enumerate(reel):
             if any(getattr(section, key) != getattr(own, key) for key in ("curve", "dynamic_stiffness", "syrope")):
                 expected = "the tension over strain of the section at the winch (tension_strain, dynamic_stiffness)"
                 laws = ("dynamic_stiffness", "syrope", "tension_strain")
@@ -190,7 +178,7 @@ def _laws_on_a_reel(cable: Cable, ends: Ends) -> Iterator[Finding]:
                 if getattr(section, key) != getattr(own, key):
                     at = ("ends", name, "payout", "reel", i, *[key][: bool(getattr(section, key))])
                     yield Finding(at, f"{what} of the section at the winch ({key})", "give it the same")
-            if _damping_of_stiffness(section) != _damping_of_stiffness(own):
+            if section.damped.stiffness != own.damped.stiffness:
                 at = ("ends", name, "payout", "reel", i, *["damping"][: section.damping is not None])
                 yield Finding(at, "the damping.stiffness of the section at the winch", "give it the same")
             if own.vortices and section.diameter != own.diameter:
@@ -256,14 +244,7 @@ def accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[F
         yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
 
 
-class ElevationAsked(Protocol):
-    """Outputs of one line or of several."""
-
-    @property
-    def elevation(self) -> tuple[Pair, ...] | None: ...
-
-
-def elevation_has_waves(output: ElevationAsked, environment: Environment) -> Iterator[Finding]:
+def elevation_has_waves(output: Output, environment: Environment) -> Iterator[Finding]:
     if output.elevation and (environment.fluid is None or environment.fluid.waves is None):
         expected = "nothing, because the sea has no waves (environment.fluid.waves)"
         yield Finding(("output", "elevation"), expected, "leave it out, or give waves")

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import AdaptiveModel, RodModel, RodZone, ZonesModel
+from hybrid.scene.attachments import BendRestrictor
 from hybrid.scene.base import Finding, Place, Table, dotted
 from hybrid.scene.cable import Cable, Section
 from hybrid.scene.ends import Clamped, Ends, Payout, Pinned
@@ -153,12 +154,8 @@ def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
             yield ("connections", name, "payout"), payout
 
 
-def _paid_out(tables: Tables) -> Iterator[Place]:
-    return (at for at, _ in _winches(tables))
-
-
-def _paid_out_at(name: str) -> Callable[[Tables], Iterator[Place]]:
-    return lambda tables: (at for at, _ in _winches(tables) if at[1] == name)
+def _paid_out(*ends: str) -> Callable[[Tables], Iterator[Place]]:
+    return lambda tables: (at for at, _ in _winches(tables) if at[1] in ends)
 
 
 def holds_rod(model: Any, end: str, length: float) -> bool:
@@ -170,22 +167,16 @@ def holds_rod(model: Any, end: str, length: float) -> bool:
     return isinstance(model, RodModel) or isinstance(zone, RodZone)
 
 
-def _damped(section: Section) -> bool:
-    return section.damping is not None and bool(section.damping.stiffness)
-
-
 def _damped_otherwise(tables: Tables) -> Iterator[Place]:
     """Sections with damping in proportion to stiffness where that is not implemented.
 
     The stiffness is not constant, tension makes a torque, or the line is clamped to what turns by the moments of its
     lines.
     """
-    cable: Cable | None = tables.get("cable")
     sections = [section for _, section in _sections(tables)]
-    restrictors = [x for x in (cable.attachments if cable is not None else ()) if x.kind == "bend_restrictor"]
     laws = any(x.curve or x.dynamic_stiffness or x.moment_curvature or x.tension_torque for x in sections)
-    if laws or restrictors or (NETWORK in tables and any(_clamped_to_free(tables))):
-        yield from _in_sections("damping", "stiffness", of=_damped)(tables)
+    if laws or any(_restrictors(tables)) or (NETWORK in tables and any(_clamped_to_free(tables))):
+        yield from _in_sections("damping", "stiffness", of=lambda x: x.damped.stiffness)(tables)
 
 
 def _turns(tables: Tables) -> Iterator[Place]:
@@ -198,15 +189,12 @@ def _turns(tables: Tables) -> Iterator[Place]:
             yield (*at, "turns")
 
 
-def _attached(kind: str) -> Callable[[Tables], Iterator[Place]]:
-    """Attachments of a kind."""
-
-    def find(tables: Tables) -> Iterator[Place]:
-        cable: Cable | None = tables.get("cable")
-        items = cable.attachments if cable is not None else ()
-        return (("cable", "attachments", i, "kind") for i, x in enumerate(items) if x.kind == kind)
-
-    return find
+def _restrictors(tables: Tables) -> Iterator[tuple[Place, BendRestrictor]]:
+    """Bend restrictors, each with its place."""
+    cable: Cable | None = tables.get("cable")
+    for i, x in enumerate(cable.attachments if cable is not None else ()):
+        if isinstance(x, BendRestrictor):
+            yield ("cable", "attachments", i, "kind"), x
 
 
 def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
@@ -220,11 +208,10 @@ def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
 
 def _locks(tables: Tables) -> Iterator[tuple[Place, float, float]]:
     """Bend restrictors on sections of two bending stiffnesses, or beside these, and stretches (m) that both have."""
-    cable: Cable | None = tables.get("cable")
-    for at in _attached("bend_restrictor")(tables):
-        item = cable.attachments[int(at[2])]  # type: ignore[union-attr]
-        for end, x in zip(accumulate(x.length for x in cable.sections), cable.sections, strict=True):  # type: ignore[union-attr]
-            low, high = max(item.range[0], end - x.length), min(item.range[1], end)  # type: ignore[union-attr]
+    for at, item in _restrictors(tables):
+        sections = tables["cable"].sections
+        for end, x in zip(accumulate(x.length for x in sections), sections, strict=True):
+            low, high = max(item.range[0], end - x.length), min(item.range[1], end)
             if x.anisotropic and low <= high:
                 yield at, low, high
 
@@ -238,17 +225,10 @@ def _slips(tables: Tables) -> Iterator[Place]:
     yield from _tables_beside_two_stiffnesses(tables)
 
 
-def _moving(tables: Tables) -> Iterator[Place]:
-    return iter([("model",)] if isinstance(tables.get("model"), AdaptiveModel) else [])
-
-
-def _asks(table: str, key: str, when: Callable[[Any], Any]) -> Callable[[Tables], Iterator[Place]]:
-    """A key of a table that is there, when `when` is true of the table."""
-    return lambda tables: iter([(table, key)] if tables.get(table) is not None and when(tables[table]) else [])
-
-
-def _plane(tables: Tables) -> Iterator[Place]:
-    return iter([("dimension",)] if tables.get("dimension") == 2 else [])
+def _asks(*at: str, when: Callable[[Any], Any]) -> Callable[[Tables], Iterator[Place]]:
+    """A table that is there, or a key of it, when `when` is true of the table."""
+    table = at[0]
+    return lambda tables: iter([at] if tables.get(table) is not None and when(tables[table]) else [])
 
 
 def _clamped(tables: Tables) -> Iterator[Place]:
@@ -294,12 +274,6 @@ def _changing_loads(tables: Tables) -> Iterator[Place]:
                 yield (*at, name)
 
 
-def _finite_waves(tables: Tables) -> Iterator[Place]:
-    environment = tables.get("environment")
-    if isinstance(getattr(environment, "waves", None), StreamFunctionWaves):
-        yield "environment", "fluid", "waves", "kind"
-
-
 def _either(*features: Feature) -> Callable[[Tables], Iterator[Place]]:
     """Where one of several features is asked for, which are refused for one reason."""
     return lambda tables: (at for x in features for at in x.places(tables))
@@ -311,7 +285,9 @@ def _used(*uses: Use) -> Callable[[Tables], Iterator[Place]]:
 
 # --- features -----------------------------------------------------------------------------------
 
-MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
+MOVING_ZONES = Feature(
+    "zones that move", "model: adaptive", _asks("model", when=lambda x: isinstance(x, AdaptiveModel))
+)
 TWO_STIFFNESSES = Feature(
     "two bending stiffnesses",
     "bending_stiffness: [EI_1, EI_2]",
@@ -336,10 +312,10 @@ TURNS = Feature("turns at an end", "ends.end.turns", _turns)
 TORSION = Feature(
     "turns at an end, torque of tension", "ends.end.turns, tension_torque", _either(TURNS, TORQUE_OF_TENSION)
 )
-PLANE = Feature("a plane", "dimension: 2", _plane)
-PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
-PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
-PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
+PLANE = Feature("a plane", "dimension: 2", _asks("dimension", when=lambda x: x == 2))
+PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out("start", "end"))
+PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out("start"))
+PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out("end"))
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
 GOES_ITS_WAY = Feature(
@@ -347,23 +323,29 @@ GOES_ITS_WAY = Feature(
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
     _either(LINES_TOUCH, SHAPES, Feature("obstacles that move", "motion", _moving_obstacles)),
 )
-ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
-ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
-_chosen_steps = _asks("time", "step", lambda x: x.step is None and x.tolerance is None)
+ACCURACY = Feature("accuracy", "accuracy", _asks("accuracy", when=bool))
+ERRORS = Feature(
+    "estimated errors", "output.errors", _asks("output", "errors", when=lambda x: getattr(x, "errors", None))
+)
+_chosen_steps = _asks("time", "step", when=lambda x: x.step is None and x.tolerance is None)
 CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step", _chosen_steps)
 _ESTIMATED = "estimated errors, accuracy, steps that it chooses"
 ESTIMATED = Feature(_ESTIMATED, "accuracy, output.errors, no time.step", _either(CHOSEN_STEPS, ACCURACY, ERRORS))
 SETTLED_FRICTION = Feature(
     "friction that has settled in the equilibrium",
     "initial.friction",
-    _asks("initial", "friction", lambda x: getattr(x, "friction", None) == "settled"),
+    _asks("initial", "friction", when=lambda x: getattr(x, "friction", None) == "settled"),
 )
 
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
 _OTHER_MOTIONS = "motions that are no sum of harmonics, loads that change in time"
 OTHER_MOTIONS = Feature(_OTHER_MOTIONS, "motion.file, motion.travel, force.history", _changing_loads)
-FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
+FINITE_WAVES = Feature(
+    "waves of finite height",
+    "waves.kind: stream_function",
+    _asks("environment", "fluid", "waves", "kind", when=lambda x: isinstance(x.waves, StreamFunctionWaves)),
+)
 
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS,

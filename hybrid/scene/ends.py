@@ -34,7 +34,6 @@ from hybrid.scene.base import (
     Words,
     numbers,
     parallel,
-    refuse,
 )
 from hybrid.scene.cable import Section
 from hybrid.scene.motion_tables import TURNS, GivenLoad, Load, Loading, Motion, Triple
@@ -136,24 +135,21 @@ class Payout(Table):
             expected = "the longest length that may be out, in m, because the winch pays out as much as it must"
             yield [Finding(("longest",), expected, "add `longest: ...` (m)")]
         for name in ("rates", "lengths"):
-            self._rows_increase(name)
+            rows = getattr(self, name) or ()
+            if rows and rows[0][0] != 0.0:
+                yield [Finding((name, 0, 0), "0, because the rows begin with the motion", "a first row at t = 0 s")]
+            for k, (one, other) in enumerate(pairwise(rows), start=1):
+                if not other[0] > one[0]:
+                    expected = f"a time after that of the row before, {one[0]:g} s"
+                    yield [Finding((name, k, 0), expected, "sort the rows")]
+            if name == "rates" and rows and rows[0][1] != 0.0:
+                expected = "0, because the line is at rest at t = 0"
+                yield [Finding((name, 0, 1), expected, "a first row [0, 0]")]
 
     @property
     def from_outside(self) -> bool:
         """Whether the length is set from Python."""
         return all(getattr(self, name) is None for name in SOURCES)
-
-    def _rows_increase(self, name: str) -> None:
-        rows = getattr(self, name) or ()
-        if rows and rows[0][0] != 0.0:
-            refuse([Finding((name, 0, 0), "0, because the rows begin with the motion", "a first row at t = 0 s")])
-        for k, (one, other) in enumerate(pairwise(rows), start=1):
-            if not other[0] > one[0]:
-                expected = f"a time after that of the row before, {one[0]:g} s"
-                refuse([Finding((name, k, 0), expected, "sort the rows")])
-        if name == "rates" and rows and rows[0][1] != 0.0:
-            expected = "0, because the line is at rest at t = 0"
-            refuse([Finding((name, 0, 1), expected, "a first row [0, 0]")])
 
 
 _TANGENT = "direction of increasing s at this end, inertial frame; any length [-]"

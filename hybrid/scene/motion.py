@@ -42,7 +42,6 @@ from hybrid.scene.motion_file import (
     read_record,
     read_table,
     spline,
-    vectors_of,
 )
 from hybrid.scene.motion_tables import SHIFTS, TURNS, Drift, Harmonic, Motion, Triple, Vessel, smooth_step
 
@@ -520,6 +519,8 @@ def motion_record(motion: Motion, position: Triple | None, turns: bool = True) -
 
     RecordRefused: the file cannot be read, or a vessel has no positions or no rotations in it.
     """
+    from scipy.spatial.transform import Rotation  # slow to import
+
     record = read_record(motion.file or "")
     vessel = motion.vessel
     if vessel is None:
@@ -531,25 +532,11 @@ def motion_record(motion: Motion, position: Triple | None, turns: bool = True) -
     c, s = math.cos(math.radians(vessel.heading)), math.sin(math.radians(vessel.heading))
     at_rest = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     arm = at_rest.T @ (np.array(position or vessel.origin) - np.array(vessel.origin))
-    axes = rotations(np.radians(record.rotation))
-    shift = record.shift + axes @ arm
+    axes = Rotation.from_rotvec(record.rotation, degrees=True)
+    shift = record.shift + axes.apply(arm)
     reach = float(np.linalg.norm(arm))
     shift_unit = record.shift_unit + reach * np.radians(record.rotation_unit.max(axis=1, keepdims=True))
     if not turns:
         return replace(record, shift=shift, shift_unit=shift_unit, rotation=None, rotation_unit=None)
-    turned = np.degrees(continuous(vectors_of(axes @ at_rest.T)))
+    turned = np.degrees(continuous((axes * Rotation.from_matrix(at_rest.T)).as_rotvec()))
     return replace(record, shift=shift, shift_unit=shift_unit, rotation=turned)
-
-
-def rotations(vectors: Array) -> Array:
-    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3) rad."""
-    angle = np.sqrt((vectors**2).sum(axis=1))
-    near = angle < 1e-4
-    safe = np.where(near, 1.0, angle)
-    a = np.where(near, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
-    b = np.where(near, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
-    K = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
-    K -= K.transpose(0, 2, 1)
-    return np.asarray(np.eye(3) + a[:, None, None] * K + b[:, None, None] * (K @ K))

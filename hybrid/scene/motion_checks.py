@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import chain
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Row, Vessel
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.sea_checks import deepest_place
 
+if TYPE_CHECKING:
+    from hybrid.scene.schema import LineScene
+
 # A harmonic motion counts as starting from rest below this part of its top speed: round-off.
 AT_REST = 1e-6
 # Time steps that a period, and a ramp, must last at least: six steps a period are a poor answer, but the same motion.
@@ -51,16 +54,6 @@ STEEL_WAVES = 5000.0
 # Largest speed and acceleration of a smooth move, over way / time and way / time^2: 15/8, and that of the polynomial
 # 10 x^3 - 15 x^4 + 6 x^5 at x = (3 - sqrt(3)) / 6.
 TOP_SPEED, TOP_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
-
-
-class Moving(Protocol):
-    """What moves and loads a line: of its scene, the tables that are asked here."""
-
-    @property
-    def ends(self) -> Ends: ...
-
-    @property
-    def environment(self) -> Environment: ...
 
 
 def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
@@ -288,12 +281,12 @@ def _winch_ramps(ends: Ends) -> Iterator[tuple[float, float]]:
             yield payout.winch.begin, payout.winch.ramp
 
 
-def longest_period(scene: Moving) -> float:
+def longest_period(scene: LineScene) -> float:
     """The longest period, s, of waves and of motions of the ends; 0 where none is named."""
     return max(_all_periods(scene.ends, scene.environment).values(), default=0.0)
 
 
-def stationary_from(scene: Moving) -> tuple[float, float] | None:
+def stationary_from(scene: LineScene) -> tuple[float, float] | None:
     """From when on (s) all that moves or loads a line is periodic or a stationary sea, and the longest period (s).
 
     None: it is not, or cannot be known: of a file, a velocity, line that is paid out, an end that is let go.
@@ -321,7 +314,7 @@ def prescribed_twist(ends: Ends) -> float:
     return twist
 
 
-def ramp_ends(scene: Moving) -> list[float]:
+def ramp_ends(scene: LineScene) -> list[float]:
     """Times, s, at which something stops growing or moving, or a load turns: a step should end there."""
     fluid, ends = scene.environment.fluid, scene.ends
     moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]
@@ -329,7 +322,8 @@ def ramp_ends(scene: Moving) -> list[float]:
     times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
     times += [load.ramp for end in ends.both for load in end.loads]
     times += [t for begin, over in _winch_ramps(ends) for t in (begin, begin + over)]
-    return [t for t in times if t] + turning_times(ends)
+    times += [row[0] for end in ends.both for load in end.loads for row in load.rows if row[0] > 0.0]
+    return [t for t in times if t]
 
 
 def _unresolved(
@@ -415,11 +409,6 @@ def _missed(rows: Sequence[Row], step: float) -> float | None:
     return float(times[bow.argmax()]) if bow.max() > MISSED * reach else None
 
 
-def turning_times(ends: Ends) -> list[float]:
-    """Times, s, of the rows of all histories: between them the loads are linear."""
-    return [row[0] for end in ends.both for load in end.loads for row in load.rows if row[0] > 0.0]
-
-
 # Numbers that no line, sea or seabed has: refused when the scene is read.
 #
 # What is possible and more likely in another unit is noted in the result instead (`model/plausibility.py`).
@@ -471,10 +460,7 @@ def moved_into_the_ground(
     sails = motion.vessel is not None and motion.file is None
     if bed is None or environment is None or place is None or time is None or sails or motion.follow is not None:
         return
-    depth, surface = length, environment.fluid.surface if environment.fluid is not None else None
-    if surface is not None:
-        depth = max(surface - bed.height(0.0, 0.0), 0.0)
-    sunk = deepest_place(bed, depth)
+    sunk = deepest_place(environment, bed, length)
     if place[2] - bed.height(*place[:2]) < -sunk or not _may_reach(place, motion, record, time, bed.is_level, bed.z):
         return  # complained of already, or far above it
     moving = EndMotion(motion, place)

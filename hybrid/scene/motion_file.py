@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import ResultError, command_for, optional_package
-from hybrid.scene.base import Finding, Findings
+from hybrid.scene.base import Finding, Findings, xyz
 
 Array = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -136,13 +136,14 @@ def read_record(path: str | Path) -> Record:
 
 def _unwound(name: str, angles: Array, lines: list[int]) -> Array:
     """Rotation vectors (n, 3) deg of roll, pitch and yaw (n, 3) deg, which may jump by full turns where they wrap."""
+    from scipy.spatial.transform import Rotation  # slow to import
 
     smooth = np.unwrap(angles, axis=0, period=360.0)
     for k, column in np.argwhere(np.abs(np.diff(smooth, axis=0)) > LARGEST_CHANGE)[:1]:
         change = smooth[k + 1, column] - smooth[k, column]
         given = f"{name}, line {lines[k + 1]}: {ANGLE_COLUMNS[column]} changes by {change:.4g} deg"
         raise RecordRefused(f"angles that change by at most {LARGEST_CHANGE:g} deg", "sample more finely", given)
-    turned = np.degrees(continuous(vectors_of(matrices_of(np.radians(smooth)))))
+    turned = np.degrees(continuous(Rotation.from_euler("xyz", smooth, degrees=True).as_rotvec()))
     for k in np.flatnonzero(np.abs(np.diff(turned, axis=0)).max(axis=1) > LARGEST_CHANGE)[:1]:
         expected = "attitudes that come through a full turn about one axis only, or stay within one"
         given = f"{name}, line {lines[k + 1]}: a full turn of an axis that is tilted"
@@ -375,43 +376,6 @@ def fastest_in(record: Record) -> tuple[float, float]:
 # Rotations of a record: roll, pitch and yaw as rotation vectors, turns counted on from row to row.
 
 
-def matrices_of(angles: Array) -> Array:
-    """Rotation matrices (n, 3, 3) Rz(yaw) Ry(pitch) Rx(roll) of angles (n, 3) rad: roll, pitch, yaw."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(angles).T, np.sin(angles).T
-    rows = [
-        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-        [-sy, cy * sx, cy * cx],
-    ]
-    return np.array(rows).transpose(2, 0, 1)
-
-
-def vectors_of(matrices: Array) -> Array:
-    """Rotation vectors (n, 3) rad, of at most half a turn, of rotation matrices (n, 3, 3); by quaternions."""
-    m = matrices
-    t = np.stack([m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]], axis=1)
-    w2 = 1.0 + t.sum(axis=1)  # 4 w^2, 4 x^2, ..
-    squares = np.column_stack([w2, 1.0 + 2.0 * t - t.sum(axis=1, keepdims=True)])
-    best = squares.argmax(axis=1)
-    d = np.stack([m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]], axis=1)  # 4 w (x, y, z)
-    xy, xz, yz = m[:, 0, 1] + m[:, 1, 0], m[:, 0, 2] + m[:, 2, 0], m[:, 1, 2] + m[:, 2, 1]
-    rows = np.stack(
-        [
-            np.column_stack([squares[:, 0], d]),
-            np.column_stack([d[:, 0], squares[:, 1], xy, xz]),
-            np.column_stack([d[:, 1], xy, squares[:, 2], yz]),
-            np.column_stack([d[:, 2], xz, yz, squares[:, 3]]),
-        ],
-        axis=1,
-    )
-    q = rows[np.arange(len(m)), best]
-    q = q / np.linalg.norm(q, axis=1, keepdims=True)
-    q = np.where(q[:, :1] < 0.0, -q, q)
-    sine = np.linalg.norm(q[:, 1:], axis=1)
-    angle = 2.0 * np.arctan2(sine, q[:, 0])
-    return np.asarray(q[:, 1:] * np.where(sine > 1e-12, angle / np.where(sine > 1e-12, sine, 1.0), 2.0)[:, None])
-
-
 def continuous(vectors: Array) -> Array:
     """Rotation vectors (n, 3) rad of the same rotations, each the nearest to the one before: turns are counted."""
     out = vectors.copy()
@@ -496,12 +460,8 @@ def _starts_at(record: Record, values: Array, base: Array, what: str, unit: str,
     if np.linalg.norm(first - base) <= SAME_START * excursion + 1e-9 * float(np.linalg.norm(base)):
         return []
     row = "in its first row" if record.times[0] == 0 else "at t = 0"
-    given = f"{record.name}, {_triple(first)} {unit} {row}"
-    return [Finding(("file",), f"{_triple(base)} {unit}, the {what} of this end at the start", fix, given)]
-
-
-def _triple(x: Array) -> str:
-    return f"[{x[0]:.8g}, {x[1]:.8g}, {x[2]:.8g}]"
+    given = f"{record.name}, {xyz(first)} {unit} {row}"
+    return [Finding(("file",), f"{xyz(base)} {unit}, the {what} of this end at the start", fix, given)]
 
 
 def _jump_finding(name: str, jump: tuple[float, float], what: str, unit: str) -> Finding:

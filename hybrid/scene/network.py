@@ -515,32 +515,22 @@ class Network(SceneTables, Asked):
             assert place is not None
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
-            else:
-                ends[key] = self._held_end(name, key, held, place, motion, carrying)
+                continue
+            clamp, moves = self.clamp(name, key), self.may_leave(name, key)
+            given: dict[str, Any] = {"position": place, "motion": motion}
+            given["payout"] = getattr(line.connections, key).payout
+            swung = isinstance(body, FixedBody) and body.motion != body.shift
+            if held is None or clamp is None:
+                twisted = moves and clamp is not None and not clamp.swivel
+                at = AtPoint(moves, clamp is not None and not moves, twisted, swung=swung)
+                ends[key] = Pinned(**given).at_point(at)
+                continue
+            given |= {"tangent": held[0], "normal": held[1], "swivel": clamp.swivel}
+            given["turns"] = 0.0 if carrying else clamp.turns  # a first shape is that of the line with no point
+            made = Clamped(**given, bend_stiffness=clamp.bend_stiffness)
+            ends[key] = made.at_point(AtPoint(moves, swung=swung))
         initial = _placed(line.initial, first["start"]) if self.starts_as_placed else _between(line.initial, ends)
         return {"ends": Ends(**ends), "initial": initial}
-
-    def _held_end(
-        self,
-        name: str,
-        key: Literal["start", "end"],
-        held: tuple[Triple, Triple | None] | None,
-        place: Triple,
-        motion: Motion | None,
-        carrying: Sequence[str],
-    ) -> End:
-        """The end of a line at a point that is held, or is a body or a knot, where this is; held: as of `direction`."""
-        clamp, moves = self.clamp(name, key), self.may_leave(name, key)
-        given: dict[str, Any] = {"position": place, "motion": motion}
-        given["payout"] = getattr(self.lines[name].connections, key).payout
-        body = self.body_of(getattr(self.lines[name], key))
-        swung = isinstance(body, FixedBody) and body.motion != body.shift
-        if held is None or clamp is None:
-            twisted = moves and clamp is not None and not clamp.swivel
-            return Pinned(**given).at_point(AtPoint(moves, clamp is not None and not moves, twisted, swung=swung))
-        turns = 0.0 if carrying else clamp.turns  # a first shape is that of the line with no point
-        given |= {"tangent": held[0], "normal": held[1], "swivel": clamp.swivel, "turns": turns}
-        return Clamped(**given, bend_stiffness=clamp.bend_stiffness).at_point(AtPoint(moves, swung=swung))
 
     def _free_end(self, name: str, key: Literal["start", "end"], near: Triple | None) -> End:
         """The end of a line at a point that is no more than that; near: as of `FreePoint.only_end`."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import chain, combinations
 from typing import Any
 
-from hybrid.scene.analysis import Accuracy, Equilibrium
+from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import Finding, Place, nearest
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import accuracy_has_errors, contradictions, elevation_has_waves, without_diameter
@@ -29,7 +29,7 @@ def findings_of(network: Network, judged: bool = False) -> Iterator[Iterator[Fin
     judged: whether each line has been by itself, in the short form.
     """
     yield _unknown_names(network)
-    yield _refused_combinations(network)
+    yield iter(dict.fromkeys(x for tables in tables_of(network) for x in refused(tables)))
     yield chain(_lonely_points(network), () if network.starts_as_placed else floating_groups(network))
     yield _start_findings(network)
     yield connection_findings(network)
@@ -40,12 +40,9 @@ def findings_of(network: Network, judged: bool = False) -> Iterator[Iterator[Fin
     yield _in_a_plane(network)
     yield travel_findings(network)
     yield elevation_has_waves(network.output, network.environment)
-    yield accuracy_has_errors(_accuracy_asked(network), network.output)
+    asked = (x.accuracy for x in network.lines.values() if x.accuracy is not None)
+    yield accuracy_has_errors(network.accuracy or next(asked, None), network.output)
     yield of_several_lines(network.output.quantities, network.lines, network.environment.seabed is not None)
-
-
-def _refused_combinations(network: Network) -> Iterator[Finding]:
-    yield from dict.fromkeys(x for tables in tables_of(network) for x in refused(tables))
 
 
 def _unknown_names(network: Network) -> Iterator[Finding]:
@@ -192,11 +189,6 @@ def _moment_findings(network: Network, name: str) -> Iterator[Finding]:
     if isinstance(point, FreePoint) and point.moment is not None:
         ends, (line, _) = Ends(start=still, end=Free(moment=point.moment)), network.lines_at(name)[0]
         yield from _load_findings(network, ends, network.lines[line], ("points", name))
-
-
-def _accuracy_asked(network: Network) -> Accuracy | None:
-    """What is asked of all lines, or of one."""
-    return network.accuracy or next((x.accuracy for x in network.lines.values() if x.accuracy is not None), None)
 
 
 def _load_findings(network: Network, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:

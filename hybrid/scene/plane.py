@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hybrid.scene.analysis import Initial, Points, Straight
-from hybrid.scene.base import Finding, Place, cross, unit
+from hybrid.scene.base import Finding, Place, cross, unit, xyz
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.combinations import PLANE, refused
 from hybrid.scene.ends import End, Ends, Triple
@@ -131,7 +131,7 @@ def _leaves(
         if out > tolerance * size:
             what = "a vector in" if w.kind == "along" else "a place in" if w.kind == "place" else "a vector normal to"
             expected = f"{what} {plane.text()}, which the rest of the scene lies in, because dimension is 2"
-            yield Finding(w.at, expected, "write `dimension: 3`, or leave dimension out", _given(w.vector))
+            yield Finding(w.at, expected, "write `dimension: 3`, or leave dimension out", xyz(w.vector))
 
 
 def _sections(cable: Cable, ends: Ends, plane: Plane) -> Iterator[Finding]:
@@ -282,10 +282,6 @@ def _sea(environment: Environment) -> Iterator[Witness]:
 def _flow_key(flow: UniformCurrent | PowerLawCurrent | CurrentPoint) -> str:
     """The key that says where the water flows."""
     return "velocity" if flow.velocity is not None else "direction" if flow.direction is not None else "speed"
-
-
-def _given(v: Triple) -> str:
-    return f"[{v[0]:.8g}, {v[1]:.8g}, {v[2]:.8g}]"
 
 
 def _minus(a: Triple, b: Triple) -> Triple:

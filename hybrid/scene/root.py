@@ -19,7 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import (
@@ -33,7 +33,7 @@ from pydantic import (
 from pydantic.functional_validators import ModelWrapValidatorHandler as Handler
 from pydantic.json_schema import models_json_schema
 
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.scene.analysis import CatenaryModel, Output
 from hybrid.scene.base import Finding, Place, dotted, refuse
 from hybrid.scene.cable import Contact
@@ -125,15 +125,9 @@ class ShortForm:
         except ComputationError as error:
             raise self.error(error) from None
         except SceneError as error:
+            t = self.text
             said = [
-                replace(
-                    x,
-                    where=self.text(x.where),
-                    value=self.text(x.value),
-                    expected=self.text(x.expected),
-                    fix=self.text(x.fix),
-                )
-                for x in error.complaints
+                Complaint(t(x.where), t(x.value), t(x.expected), t(x.fix), x.line, x.column) for x in error.complaints
             ]
             raise SceneError(said, error.file) from None
 

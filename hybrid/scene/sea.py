@@ -130,28 +130,10 @@ class Surface(NamedTuple):
 
 def _slopes(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Slopes along the first axis at the points `at`, limited so that the cubics between are monotone (PCHIP)."""
-    h = np.diff(at).reshape(-1, *[1] * (values.ndim - 1))
-    chord = np.diff(values, axis=0) / h
-    if len(chord) == 1:
-        return np.repeat(chord, 2, axis=0)
-    out = np.zeros_like(values)
-    before, after = chord[:-1], chord[1:]
-    w_before, w_after = h[:-1] + 2.0 * h[1:], 2.0 * h[:-1] + h[1:]
-    same = np.sign(before) * np.sign(after) > 0.0
-    # harmonic mean; a ratio of chords instead of their inverses, which can overflow
-    low, high = np.minimum(abs(before), abs(after)), np.maximum(abs(before), abs(after))
-    at_low = np.where(abs(before) <= abs(after), w_before, w_after)
-    ratio = np.divide(low, high, out=np.zeros_like(low), where=same)
-    total = w_before + w_after
-    mean = low * total / (at_low + (total - at_low) * ratio)
-    out[1:-1] = np.where(same, np.sign(before) * mean, 0.0)
-    for end, k, beside in ((0, 0, 1), (-1, -1, -2)):
-        near, far = chord[k], chord[beside]
-        slope = near + (near - far) * (h[k] / (h[k] + h[beside]))
-        slope = np.where(np.sign(slope) == np.sign(near), slope, 0.0)
-        turns = (np.sign(near) != np.sign(far)) & (abs(slope) > 3.0 * abs(near))
-        out[end] = np.where(turns, 3.0 * near, slope)
-    return out
+    from scipy.interpolate import PchipInterpolator  # slow to import
+
+    with np.errstate(over="ignore"):  # of the inverse of a chord that is next to nothing
+        return np.asarray(PchipInterpolator(at, values)(at, 1))
 
 
 def _surface(x: NDArray[np.float64], y: NDArray[np.float64], depth: NDArray[np.float64]) -> Surface:

@@ -191,20 +191,18 @@ def seabed_is_no_depth(environment: Environment, ends: Ends) -> Iterator[Finding
         yield Finding(("environment", "seabed", "z"), expected, f"write z: {-z:.8g}")
 
 
-def deepest_place(seabed: Seabed, depth: float) -> float:
-    """How far under the bed an end may be, m; depth: m, of the water, or the length of the line."""
+def deepest_place(environment: Environment, seabed: Seabed, length: float) -> float:
+    """How far under the bed an end may be, m; length: of the line, m, for the depth where the water has none."""
+    depth = length if environment.depth is None else max(environment.depth, 0.0)
     return max(SUNK * depth, BURIED if seabed.soil is not None else 0.0)
 
 
 def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
     """Ends, bodies and initial shapes under the seabed."""
-    seabed, fluid = environment.seabed, environment.fluid
+    seabed = environment.seabed
     if seabed is None or is_a_depth(environment, ends):
         return
-    depth = cable.length
-    if fluid is not None and fluid.surface is not None:
-        depth = max(fluid.surface - seabed.height(0.0, 0.0), 0.0)
-    sunk = deepest_place(seabed, depth)
+    sunk = deepest_place(environment, seabed, cable.length)
     fix = "raise it, or lower environment.seabed.z"
     if seabed.depths is not None:
         yield from _within_depths(seabed.depths, ends)

@@ -21,7 +21,7 @@ from hybrid.scene.attachments import (
     Swivel,
     sphere_diameter,
 )
-from hybrid.scene.base import Finding, Place, unit
+from hybrid.scene.base import Finding, Place, unit, xyz
 from hybrid.scene.cable import USUAL_DENSITIES, Cable, Environment
 from hybrid.scene.ends import Body, Ends, Triple
 from hybrid.scene.motion_tables import farthest, moving_key, shift, smaller
@@ -43,10 +43,6 @@ DRAWN_STRAIN = 0.01
 
 # A weight below this part of all weights and lifts is their round-off.
 WEIGHTLESS = 1e-9
-
-
-def _xyz(position: Triple) -> str:
-    return f"[{position[0]:.8g}, {position[1]:.8g}, {position[2]:.8g}]"
 
 
 def _along(origin: Triple, direction: Triple, distance: float) -> Triple:
@@ -84,14 +80,14 @@ def span(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
         distance = math.dist(held["start"], held["end"])
         expected = too_short(cable, distance)
         if expected is not None:
-            given = f"{_xyz(held['end'])}, which is {distance:.8g} m from the start"
+            given = f"{xyz(held['end'])}, which is {distance:.8g} m from the start"
             yield Finding(("ends", "end", "position"), expected, fix, given)
     elif near and len(places := held | near) == 2:
         distance, allowed = math.dist(places["start"], places["end"]), cable.length * (1 + POLYLINE_STRETCH)
         if distance > allowed:
             name = "end" if "end" in near else "start"
             expected = f"a place at most {allowed:.8g} m from the other end; the cable is {cable.length:.8g} m long"
-            given = f"{_xyz(near[name])}, which is {distance:.8g} m from the other end"
+            given = f"{xyz(near[name])}, which is {distance:.8g} m from the other end"
             yield Finding(("ends", name, "initial_guess"), expected, "a longer cable or a nearer place", given)
 
 
@@ -102,7 +98,7 @@ def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Find
         return
     if (expected := too_short(cable, found.distance)) is None:
         return
-    given = f"motion to {_xyz(found.place)} at t = {found.t:.6g} s, {found.distance:.8g} m from the other end"
+    given = f"motion to {xyz(found.place)} at t = {found.t:.6g} s, {found.distance:.8g} m from the other end"
     more = f"a longer cable, {found.distance:.6g} m or more, or {smaller(found.key)}"
     yield Finding(("ends", found.end, "motion", found.key), expected, more, given)
 
@@ -259,11 +255,11 @@ def _straight_start(cable: Cable, ends: Ends, initial: Straight) -> Iterator[Fin
         yield Finding(("initial", "origin"), expected, "add `origin: [x, y, z]` (m), the position of s = 0")
         return
     if initial.origin is not None and math.dist(initial.origin, origin) > near:
-        expected = f"{_xyz(origin)}, which follows from the held end"
+        expected = f"{xyz(origin)}, which follows from the held end"
         yield Finding(("initial", "origin"), expected, "leave origin out")
     tip = _along(origin, initial.direction, length)
     if len(held) == 2 and math.dist(tip, held["end"]) > near:
-        expected = f"a straight cable that ends at ends.end.position {_xyz(held['end'])}; this one ends at {_xyz(tip)}"
+        expected = f"a straight cable that ends at ends.end.position {xyz(held['end'])}; this one ends at {xyz(tip)}"
         yield Finding(("initial", "direction"), expected, "use `initial: {kind: equilibrium}`; it finds the shape")
     yield from _bodies_agree(ends, origin, tip, near)
     if held and initial.velocity is not None and any(initial.velocity):
@@ -281,7 +277,7 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, loa
     for name, index in (("start", 0), ("end", len(points) - 1)):
         position = ends.held().get(name)
         if position is not None and math.dist(points[index], position) > SAME_PLACE * length:
-            expected = f"{_xyz(position)}, where ends.{name}.position holds the cable"
+            expected = f"{xyz(position)}, where ends.{name}.position holds the cable"
             yield Finding(("initial", "points", index), expected, "let the polyline begin and end at the held ends")
     yield from _bodies_agree(ends, points[0], points[-1], SAME_PLACE * length)
 
@@ -337,7 +333,7 @@ def _bodies_agree(ends: Ends, first: Triple, last: Triple, near: float) -> Itera
         there = first if name == "start" else last
         if math.dist(position, there) > near:
             here: Place = ("ends", name, "initial_guess")
-            yield Finding(here, f"{_xyz(there)}, where initial puts this end of the cable", "leave initial_guess out")
+            yield Finding(here, f"{xyz(there)}, where initial puts this end of the cable", "leave initial_guess out")
 
 
 Hung = Float | Clump | Swivel | Modules | Body

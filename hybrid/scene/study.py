@@ -283,12 +283,9 @@ SPOKEN_FOR = ("pi", "sqrt", "exp", "log", "sin", "cos", "tan", "radians", "abs",
 MOTION = "over: max, for example: what of its history in a run"
 
 
-def _place_kind(value: Any) -> str:
-    return "<end>" if isinstance(value, str) else "<number>"
-
-
 Where = Annotated[
-    Annotated[Number, Tag("<number>")] | Annotated[Literal["start", "end"], Tag("<end>")], Discriminator(_place_kind)
+    Annotated[Number, Tag("<number>")] | Annotated[Literal["start", "end"], Tag("<end>")],
+    Discriminator(lambda x: "<end>" if isinstance(x, str) else "<number>"),
 ]
 
 

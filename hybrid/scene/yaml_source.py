@@ -49,11 +49,6 @@ RULES = (
     ("int", [*"-+", *_DIGITS], r"^(?:[-+]?0b[0-1_]+|[-+]?0o?[0-7_]+|[-+]?[0-9_]+|[-+]?0x[0-9a-fA-F_]+)$"),
     ("merge", ["<"], r"^(?:<<)$"),
     ("null", ["~", "n", "N", ""], r"^(?:~|null|Null|NULL|)$"),
-    ("timestamp", [*_DIGITS],
-     r"^(?:[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]|[0-9][0-9][0-9][0-9]-[0-9][0-9]?-[0-9][0-9]?(?:[Tt]|[ \t]+)"
-     r"[0-9][0-9]?:[0-9][0-9]:[0-9][0-9](?:\.[0-9]*)?(?:[ \t]*(?:Z|[-+][0-9][0-9]?(?::[0-9][0-9])?))?)$"),
-    ("value", ["="], r"^(?:=)$"),
-    ("yaml", [*"!&*"], r"^(?:!|&|\*)$"),
 )  # fmt: skip
 
 
@@ -224,15 +219,8 @@ def _build_table(
                 if isinstance(source.value, dict):
                     merged = {**source.value, **merged}
                 else:
-                    complaints.append(
-                        Complaint(
-                            dotted((*path, key)),
-                            source.show(),
-                            "a table to merge",
-                            "`<<` takes an alias of a table; or leave it out",
-                            *spot,
-                        )
-                    )
+                    at, fix = dotted((*path, key)), "`<<` takes an alias of a table; or leave it out"
+                    complaints.append(Complaint(at, source.show(), "a table to merge", fix, *spot))
             continue
         if key in table.value:
             first = table.key_places[key]

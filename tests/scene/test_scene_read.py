@@ -417,9 +417,10 @@ def test_words_are_what_ruamel_takes_them_for() -> None:
     def plain(pattern: str) -> str:
         return re.sub(r"\s+", "", pattern.replace(r"[ \t]", "<blank>"))
 
-    theirs = [(tag, first, plain(x.pattern)) for versions, tag, x, first in implicit_resolvers if (1, 2) in versions]
     ours = [(f"tag:yaml.org,2002:{tag}", first, plain(pattern)) for tag, first, pattern in yaml_source.RULES]
-    assert ours == theirs
+    tags = [tag for tag, *_ in ours]  # words of other tags are text
+    theirs = [(tag, first, plain(x.pattern)) for versions, tag, x, first in implicit_resolvers if (1, 2) in versions]
+    assert ours == [x for x in theirs if x[0] in tags]
 
 
 TWO_LINES = """\

@@ -88,11 +88,18 @@ def import_moordyn(path: str | Path, line: int | None = None, separate: bool = F
         found = _chosen(deck, found, lost, line)
     if not found:
         expected = "a line that a scene can be made of; "
-        complaints = [Complaint("no scene", n.text, expected + n.why, n.instead, n.line) for n in lost]
+        raise SceneError([Complaint("no scene", n.text, expected + n.why, n.instead, n.line) for n in lost], deck.file)
+    scenes: dict[str, ImportedScene] = {}
+    complaints = []
+    for cable in found:
+        try:
+            scenes[cable.name] = scene_of(deck, cable)
+        except SceneError as error:
+            complaints += error.complaints
+    if complaints:
         raise SceneError(complaints, deck.file)
-    scenes = _all_scenes(deck, found)
     notes = [*deck.notes, *lost, *_no_place(source, deck)]
-    return ImportedDeck(deck.file, {made.name: made for made in scenes}, in_order(notes))
+    return ImportedDeck(deck.file, scenes, in_order(notes))
 
 
 def _is_written(path: Path) -> bool:
@@ -130,20 +137,6 @@ def _chosen(deck: Deck, found: list[Cable], lost: list[Note], line: int) -> list
         row = deck.lines[line].row
         lost[:] = [n for n in lost if n.line == row.line]
     return chosen
-
-
-def _all_scenes(deck: Deck, found: list[Cable]) -> list[ImportedScene]:
-    """The scenes; SceneError with the complaints about all of them."""
-    made: list[ImportedScene] = []
-    complaints: list[Complaint] = []
-    for cable in found:
-        try:
-            made.append(scene_of(deck, cable))
-        except SceneError as error:
-            complaints += error.complaints
-    if complaints:
-        raise SceneError(complaints, deck.file)
-    return made
 
 
 def _no_place(source: Source, deck: Deck) -> list[Note]:

@@ -292,14 +292,10 @@ def scene_of(deck: Deck, cable: Cable) -> ImportedScene:
     try:
         scene = parse_scene(text)
     except SceneError as error:
-        raise SceneError([_of_deck(cable, c) for c in error.complaints], deck.file) from None
+        line, where = cable.lines[0][0].row.line, f"{cable.name}, as a scene"
+        found = [replace(c, where=f"{where}: {c.where}", line=line, column=None) for c in error.complaints]
+        raise SceneError(found, deck.file) from None
     return ImportedScene(cable.name, cable.ids, scene, text, in_order(made.notes))
-
-
-def _of_deck(cable: Cable, complaint: Complaint) -> Complaint:
-    """A complaint about a scene, as one about the lines that it is made of."""
-    where = f"{cable.name}, as a scene: {complaint.where}"
-    return replace(complaint, where=where, line=cable.lines[0][0].row.line, column=None)
 
 
 class _Maker(Tables):

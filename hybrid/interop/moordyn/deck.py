@@ -386,13 +386,10 @@ def _rod(source: Source, row: Row, notes: list[Note]) -> Rod | None:
 # --- lines -------------------------------------------------------------------------------------
 
 
-def _lines_are_old(section: Section) -> bool:
-    """Whether lengths stand before ends, as in MoorDyn 1: their columns are as many, so the names decide."""
-    return section.names is not None and any(simple(c) in _LENGTH[1:] for c in section.names.cells[2:3])
-
-
 def _line(source: Source, row: Row, notes: list[Note]) -> Line | None:
-    old = _lines_are_old(source.sections["lines"])
+    # whether lengths stand before ends, as in MoorDyn 1: their columns are as many, so the names decide
+    third = header.cells[2:3] if (header := source.sections["lines"].names) is not None else ()
+    old = any(simple(c) in _LENGTH[1:] for c in third)
     names = _LINE_V1 if old else _LINE_V2
     if not source.columns(row, 7, 7, names):
         return None

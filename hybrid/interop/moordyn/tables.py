@@ -30,10 +30,14 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from hybrid.interop.moordyn.deck import Body, Deck, Line, LineType, Point, Rod, Triple
 from hybrid.interop.moordyn.rows import DIFFERS, LEFT_OUT, TAKEN, Note, note, number
 from hybrid.interop.moordyn.stretch import tables_of
 from hybrid.scene.attachments import sphere_diameter
+from hybrid.scene.base import turned
+from hybrid.scene.bodies import AXES, mass_about
 from hybrid.scene.cable import Section
 
 _TURBINE = (
@@ -270,7 +274,6 @@ def _rotated(angles: Triple, v: Triple) -> Triple:
 
 # --- rigid bodies ------------------------------------------------------------------------------
 
-Matrix = tuple[Triple, Triple, Triple]
 DAMP = "give `damping`, about its mean motion"
 
 
@@ -288,30 +291,9 @@ def three(cell: str, alone: str) -> Triple | None:
     return (found[0], found[1], found[2]) if found is not None and len(found) == 3 else None
 
 
-def _product(*matrices: Matrix) -> Matrix:
-    a, *rest = matrices
-    if not rest:
-        return a
-    b = _product(*rest)
-    rows = [[sum(a[i][k] * b[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
-    x, y, z = ((row[0], row[1], row[2]) for row in rows)
-    return x, y, z
-
-
-def _about(angles: Triple) -> tuple[Matrix, Matrix, Matrix]:
-    """Rotations about x, y and z by angles in degrees."""
-    (cx, cy, cz), (sx, sy, sz) = ([f(math.radians(a)) for a in angles] for f in (math.cos, math.sin))
-    return (
-        ((1.0, 0.0, 0.0), (0.0, cx, -sx), (0.0, sx, cx)),
-        ((cy, 0.0, sy), (0.0, 1.0, 0.0), (-sy, 0.0, cy)),
-        ((cz, -sz, 0.0), (sz, cz, 0.0), (0.0, 0.0, 1.0)),
-    )
-
-
 def rotation_of(angles: Triple) -> Triple:
     """Roll, pitch, yaw (degrees) as a scene has them, of the angles of a deck."""
-    x, y, z = _about(angles)
-    R = _product(x, y, z)
+    R = [*zip(*(_rotated(angles, x) for x in AXES), strict=True)]
     flat = math.hypot(R[0][0], R[1][0])
     if flat < 1e-12:  # straight up or down: yaw is none of its own
         return _degrees(math.atan2(-R[1][2], R[1][1]), math.atan2(-R[2][0], flat), 0.0)
@@ -320,8 +302,7 @@ def rotation_of(angles: Triple) -> Triple:
 
 def angles_of(rotation: Triple) -> Triple:
     """The angles of a deck of roll, pitch, yaw of a scene (degrees)."""
-    x, y, z = _about(rotation)
-    R = _product(z, y, x)
+    R = [*zip(*(turned(rotation, x) for x in AXES), strict=True)]
     flat = math.hypot(R[0][0], R[0][1])
     if flat < 1e-12:
         return _degrees(math.atan2(R[2][1], R[1][1]), math.atan2(R[0][2], flat), 0.0)
@@ -388,12 +369,12 @@ def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple
     masses = [(mass[0], centre), *((p.mass, p.place) for p in parts)]
     whole, about = _centre(masses)
     turning = _inertia(inertia, masses, about)
-    if max(abs(turning[i][j]) for i in range(3) for j in range(i)) > _PRODUCTS * min(turning[i][i] for i in range(3)):
+    if np.abs(np.tril(turning, -1)).max() > _PRODUCTS * turning.diagonal().min():
         return "a free rigid body that the masses of its points give products of inertia"
     found: dict[str, Any] = {"kind": "free", "initial_guess": body.place, "mass": whole}
     found |= {"initial_rotation": turned} if any(turned) else {}
     found |= {"centre": about} if any(about) else {}
-    found["inertia"] = (turning[0][0], turning[1][1], turning[2][2])
+    found["inertia"] = turning.diagonal().tolist()
     if density:
         volumes = [(volume[0], centre), *((p.volume, p.place) for p in parts)]
         displaced, lift = _centre(volumes)
@@ -424,16 +405,9 @@ def _centre(parts: Sequence[tuple[float, Triple]]) -> tuple[float, Triple]:
     return total, (x, y, z)
 
 
-def _inertia(own: Triple, masses: Sequence[tuple[float, Triple]], centre: Triple) -> list[list[float]]:
+def _inertia(own: Triple, masses: Sequence[tuple[float, Triple]], centre: Triple) -> Any:
     """(3, 3) about the common centre, kg m^2, of the first mass with its own moments and of mass points."""
-    found = [[own[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
-    for m, place in masses:
-        r = [a - b for a, b in zip(place, centre, strict=True)]
-        square = sum(x * x for x in r)
-        for i in range(3):
-            for j in range(3):
-                found[i][j] += m * ((square if i == j else 0.0) - r[i] * r[j])
-    return found
+    return sum((mass_about(m, np.subtract(place, centre))[3:, 3:] for m, place in masses), np.diag(own))
 
 
 def _added(own: Sequence[float], parts: Sequence[Point], density: float) -> dict[str, Any]:
@@ -441,17 +415,8 @@ def _added(own: Sequence[float], parts: Sequence[Point], density: float) -> dict
     pieces = [(density * p.volume * p.added, p.place) for p in parts if p.volume and p.added]
     if not pieces:
         return {"added_mass": [*own, 0.0, 0.0, 0.0]} if any(own) else {}
-    M = [[own[i] if i == j < 3 else 0.0 for j in range(6)] for i in range(6)]
-    for m, (x, y, z) in pieces:
-        offset = ((0.0, m * z, -m * y), (-m * z, 0.0, m * x), (m * y, -m * x, 0.0))
-        turning = _inertia((0.0, 0.0, 0.0), [(m, (x, y, z))], (0.0, 0.0, 0.0))
-        for i in range(3):
-            M[i][i] += m
-            for j in range(3):
-                M[i][3 + j] += offset[i][j]
-                M[3 + j][i] += offset[i][j]
-                M[3 + i][3 + j] += turning[i][j]
-    return {"added_mass": M}
+    M = np.diag([*own, 0.0, 0.0, 0.0]) + sum(mass_about(m, place) for m, place in pieces)
+    return {"added_mass": M.tolist()}
 
 
 # --- tables as YAML ----------------------------------------------------------------------------

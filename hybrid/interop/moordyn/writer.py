@@ -22,7 +22,7 @@ from typing import Any
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.tables import NEAR, body_row
-from hybrid.scene.cable import Section
+from hybrid.scene.cable import AddedMass, Drag, Section
 from hybrid.scene.read import read_text
 
 Triple = tuple[float, float, float]
@@ -49,6 +49,13 @@ _BODIES = (
 )
 _POINTS = "--- POINTS ---\nID Attachment X Y Z M V CdA Ca\n(#) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)\n"
 _LINES = "--- LINES ---\nID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (-) (-) (-) (m) (-) (-)\n"
+# What a deck has not along a line, and what to do.
+_NO_POINTS = {
+    "swivel": "make it a clump: lines of a deck have no torque",
+    "modules": "give their mass, volume and drag to a section of that length",
+    "bend_stiffener": "give its bending stiffness to short sections of that length",
+    "bend_restrictor": "give its bending stiffness to short sections of that length",
+}
 
 
 @dataclass(frozen=True)
@@ -283,19 +290,9 @@ class _Writer:
         """What hangs on a line, by arc length; where sections meet, at just that."""
         found: dict[float, _Lump] = {}
         for i, item in enumerate(cable.attachments):
-            if item.kind == "swivel":
-                fix = "make it a clump: lines of a deck have no torque"
-                self._refuse(f"{where}[{i}]", "swivel", "a clump or a float, which a deck has as points", fix)
-                continue
-            if item.kind == "modules":
-                fix = "give their mass, volume and drag to a section of that length"
-                self._refuse(f"{where}[{i}]", "modules", "a clump or a float, which a deck has as points", fix)
-                continue
-            if item.kind in ("bend_stiffener", "bend_restrictor"):
-                fix = "give its bending stiffness to short sections of that length"
-                self._refuse(
-                    f"{where}[{i}]", item.kind.replace("_", " "), "a clump or a float, which a deck has as points", fix
-                )
+            if item.kind in _NO_POINTS:
+                expected = "a clump or a float, which a deck has as points"
+                self._refuse(f"{where}[{i}]", item.kind.replace("_", " "), expected, _NO_POINTS[item.kind])
                 continue
             s = next((x for x in (*bounds, *found) if abs(x - item.at) <= 1e-9 * bounds[-1]), item.at)
             if s in (0.0, bounds[-1]):
@@ -348,20 +345,16 @@ class _Writer:
             self._refuse(
                 f"{where}.bending_stiffness", section.bending_stiffness, expected, "give one bending stiffness"
             )
-        damping = section.damping
-        if damping is not None and damping.mass:
+        damping, drag, added = section.damped, section.drag or Drag(), section.added_mass or AddedMass()
+        if damping.mass:
             self.notes.append(f"{where}.damping.mass is left out: MoorDyn has none")
         if section.vortices is not None:
             self.notes.append(f"{where}.vortices is left out: lines of the deck shed no vortices")
         if section.weakest_bending:
             self.notes.append("MoorDyn has no torsion")
-        drag = (section.drag.normal, section.drag.tangential) if section.drag is not None else (0.0, 0.0)
-        added = (
-            (section.added_mass.normal, section.added_mass.tangential) if section.added_mass is not None else (0.0, 0.0)
-        )
-        ba = damping.stiffness * section.axial_stiffness if damping is not None else 0.0
+        ba = damping.stiffness * section.axial_stiffness
         sizes = section.diameter or NO_DIAMETER, section.mass, section.axial_stiffness, ba
-        values = (*sizes, section.weakest_bending or 0.0, drag[0], added[0], drag[1], added[1])
+        values = (*sizes, section.weakest_bending or 0.0, drag.normal, added.normal, drag.tangential, added.tangential)
         return self.types.setdefault(values, f"type{len(self.types) + 1}")
 
     def _step(self, section: Section, l: float) -> None:
@@ -371,8 +364,8 @@ class _Writer:
         self.steps.append(STRETCH * l / math.sqrt(section.axial_stiffness / section.mass))
         if section.weakest_bending:
             self.steps.append(BEND * l * l / math.sqrt(section.weakest_bending / section.mass))
-        if section.damping is not None and section.damping.stiffness:
-            self.steps.append(DAMPED * section.mass * l * l / (section.damping.stiffness * section.axial_stiffness))
+        if section.damped.stiffness:
+            self.steps.append(DAMPED * section.mass * l * l / (section.damped.stiffness * section.axial_stiffness))
 
     def add_body(self, name: str, place: Triple, rotation: Triple) -> None:
         """A body of the scene, at its place (m) and rotation (deg)."""
@@ -401,7 +394,7 @@ class _Writer:
         """What the deck has at a point; "": rods that hold the lines there, which come with them."""
         point = self.scene.points[name]
         line, end = self.scene.lines_at(name)[0]
-        shape = self.shapes[line]
+        place = self.shapes[line].place_at(0.0 if end == "start" else self.shapes[line].s[-1])
         if getattr(point, "break_at", None) is not None:
             self.notes.append(f"points.{name}.break_at is left out")
         if point.kind == "guided":
@@ -413,9 +406,9 @@ class _Writer:
             if all(self.scene.clamp(*x) is not None and self._bends(*x) for x in here):
                 return ""  # there are rods alone
             kind = "Coupled" if point.motion is not None else "Fixed"
-            made = self._point(kind, shape.place_at(0.0 if end == "start" else shape.s[-1]), _Lump())
+            made = self._point(kind, place, _Lump())
         elif point.kind == "free":
-            made = self._loose(f"points.{name}", point.end, shape.place_at(0.0 if end == "start" else shape.s[-1]))
+            made = self._loose(f"points.{name}", point.end, place)
         else:
             row = (*point.place, 0.0, 0.0, 0.0, 0.0)
             self.points.append(f"Body{1 + list(self.bodies).index(point.body)} {' '.join(map(_number, row))}")
@@ -424,10 +417,9 @@ class _Writer:
         return made
 
     def _loose(self, where: str, end: Any, place: Triple) -> str:
-        if any(load.what == "force" for load in end.loads) or any(load.what == "moment" for load in end.loads):
-            self._refuse(
-                where, "force", "no force, because points of a deck have none", "leave the force out, for a comparison"
-            )
+        if end.loads:
+            expected = "no force, because points of a deck have none"
+            self._refuse(where, "force", expected, "leave the force out, for a comparison")
         lump = _Lump()
         if end.kind == "body":
             lump.add(end, end.volume if self.fluid is not None else 0.0)
