@@ -23,6 +23,7 @@ from hybrid.designs.tangents import NetworkOthers, Unfollowed
 from hybrid.kernels.state.report import PLANAR
 from tests.designs.test_in_motion import heaved, on_the_bed
 from tests.designs.test_system_tangents import asked_of
+from tests.inside import calls_of
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
@@ -86,13 +87,9 @@ def test_a_touchdown_that_moves(model: str) -> None:
 def test_a_line_in_a_plane_is_followed_in_it(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same tangents as in space, where it goes by a number that moves its plane."""
     tables, of, found = on_the_bed(model), ["last tension@start", "std position.z@150", "max tension@end"], []
-    plain, bits = NetworkOthers._call_each_step, list[int]()
-
-    def follow(self: NetworkOthers, reports: Any) -> None:
-        plain(self, reports)
-        bits.append(self._model.models[0].line.bits & PLANAR)
-
-    monkeypatch.setattr(NetworkOthers, "_call_each_step", follow)
+    bits = calls_of(
+        monkeypatch, NetworkOthers, "_call_each_step", after=lambda _, x, *__: x._model.models[0].line.bits & PLANAR
+    )
     tables["time"]["duration"] = 2.0
     for dimension, beside in ((None, []), (3, []), (None, ["ends.end.position[1]"])):
         scene = hybrid.validate_scene(tables | ({"dimension": dimension} if dimension else {}))

@@ -12,6 +12,7 @@ from hybrid.model.mesh import Zone
 from hybrid.outputs import observed_states
 from hybrid.outputs.observation import JoinedGrid
 from hybrid.outputs.observed_states import Grid, means_beside
+from tests.inside import calls_of
 
 Floats = np.ndarray
 
@@ -95,8 +96,7 @@ def test_grids_of_many_lines_are_made_at_once(monkeypatch: pytest.MonkeyPatch) -
         if cells > 1:
             zones = [Zone("rod", 0.0, x[cells // 2]), Zone("catenary", x[cells // 2], 10.0)]
         grids.append(Grid(x, zones, s, [x[1]] if cells > 1 else []))
-    calls, makes, joined = [], observed_states._rows, JoinedGrid(grids)
-    monkeypatch.setattr(observed_states, "_rows", lambda *given: calls.append(1) or makes(*given))
+    calls, joined = calls_of(monkeypatch, observed_states, "_rows"), JoinedGrid(grids)
     found = {name: getattr(joined, name) for name in ("nodes", "cells", "chords", "held", "sides")}
     assert len(calls) == 5
     for name, rows in found.items():

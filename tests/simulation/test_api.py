@@ -19,6 +19,7 @@ from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.scene.read import as_scene
 from hybrid.simulation import first_use
 from hybrid.simulation.progress import Progress
+from tests.inside import calls_of
 
 WIRE: dict[str, Any] = {
     "cable": {"sections": [{"length": 2.0, "mass": 1.0}]},
@@ -286,9 +287,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the kernels that take long to compile: else a machine would be said to be ready while they compile."""
-    called: set[str] = set()
-    taking = KeptCode.taking
-    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
+    called = calls_of(monkeypatch, KeptCode, "taking", lambda code, _: code._name)
     scene = as_scene(KINDS[kind])
     known = first_use.kernels_of(scene, static)
     hybrid.static(scene) if static else hybrid.run(scene)
@@ -299,7 +298,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     stood_for = {before[name] for name in known if name in before}  # compiled before those, by the same calls
     if "zones" in kind:
         stood_for.add(first_use.STABILITY)  # zones may come out without a rod: nobody knows before
-    assert not (called & large) - set(known) - stood_for
+    assert not ({*called} & large) - set(known) - stood_for
 
 
 @pytest.mark.long
@@ -318,9 +317,7 @@ def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nor one in a plane for that in space: together they take longer to compile than all else."""
-    called: set[str] = set()
-    taking = KeptCode.taking
-    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
+    called = calls_of(monkeypatch, KeptCode, "taking", lambda code, _: code._name)
     hybrid.run(KINDS[kind])
-    assert not called & {"run.newton.solve_network", "junctions.junctions.join_lines"}
+    assert not {*called} & {"run.newton.solve_network", "junctions.junctions.join_lines"}
     assert ("run.newton.in_space" in called) == kind.startswith("rod in space")

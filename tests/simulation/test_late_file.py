@@ -18,6 +18,7 @@ from hybrid.store import whole_file, writer
 from hybrid.store.format import ArrayContents
 from hybrid.store.records import FileContents
 from hybrid.store.whole_file import LateFile
+from tests.inside import calls_of
 from tests.said import assert_same_results
 from tests.scenes import cable_scene, pinned_at
 
@@ -67,9 +68,7 @@ def of_two_lines() -> dict[str, Any]:
 def test_a_file_that_is_late_is_as_one_that_grew(
     scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made: list[Path] = []
-    place = LateFile.place
-    monkeypatch.setattr(LateFile, "place", lambda self: made.append(self.path) or place(self))
+    made = calls_of(monkeypatch, LateFile, "place", lambda file: file.path)
     monkeypatch.setattr(writer, "pause", lambda _: 1e9)  # none are due, however busy the machine is
     hybrid.run(scene, tmp_path / "late.h5").close()
     assert tmp_path / "late.h5" in made
