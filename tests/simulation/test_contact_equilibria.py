@@ -208,16 +208,15 @@ def test_a_line_that_loses_its_turns_without_contact_is_found_with_it(monkeypatc
 # --- Equilibria of networks with lines that touch themselves: beside each other, at a body, and runs that begin there
 # ---
 
-WIDTH_BESIDE_BODY = 0.02
 HOSE = {
-    "length": 4.0, "mass": 0.4, "diameter": WIDTH_BESIDE_BODY, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
+    "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
     "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
 }  # fmt: skip
 LINE = {
     "sections": [HOSE], "attachments": [{"kind": "clump", "at": 2.0, "mass": 2.0}], "mesh": {"cells": 160},
     "contact": {"self": True, "friction": 0.3},
 }  # fmt: skip
-Y = 0.9 * WIDTH_BESIDE_BODY  # m, between the ends of a U
+Y = 0.9 * WIDTH  # m, between the ends of a U
 OPEN = [[0, 0, 0], [-0.5, 0, -1.0], [0, 0.5 * Y, -1.85], [0.5, Y, -1.0], [0, Y, 0]]
 COMMON = {"time": {"duration": 0.3, "step": 0.01}, "output": {"every": 0.1, "points": 81}}
 
@@ -257,9 +256,7 @@ def test_a_line_that_a_body_presses_against_itself() -> None:
     scene = at_a_body()
     result = hybrid.static(scene)
     hose = result.lines["hose"]
-    assert (
-        hose["energy/self_contact"][0] > 0.0 and 0.94 < float(hose["self_distance/distance"]) / WIDTH_BESIDE_BODY < 1.05
-    )
+    assert hose["energy/self_contact"][0] > 0.0 and 0.94 < float(hose["self_distance/distance"]) / WIDTH < 1.05
     assert result.attributes["static_residual"] < 1e-9
     without = at_a_body()
     without["lines"]["hose"]["contact"] = {"self": False}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bits import Stopping, differences
-from controlled import OneLine
+from controlled import OneLine, made_up
 from test_late_file import described
 from typer.testing import CliRunner
 
@@ -337,14 +337,6 @@ def test_a_finer_result_is_no_file_before_it_is_complete(tmp_path: Path, monkeyp
 # --- What a refinement returns is never worse than the run before it ---
 
 ASKED = RequestedAccuracy(0.005, None, None)
-
-
-def made_up(fineness: float = 1.0, steps: int = 100, off: float = 0.0) -> RunSample:
-    """A run whose position is off by 0.01 m/fineness^2, and by `off` at one point and output."""
-    position = np.full((9, 4, 3), 0.01 / fineness**2)
-    position[5, 2] += off
-    resolution = Resolution(fineness, 10.0 / steps, 1e-6, 1e-3)
-    return RunSample(resolution, {"position": position}, round(100 * fineness), steps, 0.0)
 
 
 def comparisons() -> list[RunSample]:
