@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.linear.loaded_line import turning_doubts
 from hybrid.linear.response_results import of_few, phases_of
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene
 from tests.simulation.test_vortices import G, body, floating, scene, small_body
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
@@ -148,9 +148,9 @@ def test_what_is_left_out_of_the_drag_of_members():
     """
     member = {"start": [0, 0, -1], "end": [0, 0, 1], "diameter": 0.05, "drag": 200.0, "pieces": 2}
     waves = {"kind": "regular", "height": 1.0, "period": 8.0, "ramp": 10.0}
+    wire = {"length": 99.8, "mass": 0.01, "diameter": 0.003, "axial_stiffness": 1e8}
     made = scene({"surface": 0.0, "waves": waves}, body(members=[member], inertia=[900.0] * 3))
-    for line in made["lines"].values():
-        line["sections"] = [{"length": 99.8, "mass": 0.01, "diameter": 0.003, "axial_stiffness": 1e8}]
+    made = each_line(made, sections=[wire])
     part = math.sqrt(3.0 / 8.0) / (8.0 / (3.0 * math.pi) / math.sqrt(2.0)) - 1.0
     for line in hybrid.response(made).lines.values():
         assert line.left_out["tension"] == pytest.approx(part, rel=0.02)

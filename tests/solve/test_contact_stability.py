@@ -13,9 +13,8 @@ from hybrid.model.network import build_network
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.solve.lines_at_rest import ContactStability, LinesAtRest, contact_stiffness
 from hybrid.solve.search import PUSHED
-from tests.scenes import line_between, network_scene
+from tests.scenes import line_between, network_scene, system_of
 from tests.validation.test_validation_lines_contact import crossing
-from tests.validation.test_validation_obstacles_of_lines import system_of
 
 Tables = dict[str, Any]
 D = 0.01  # m

@@ -20,7 +20,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.simulation import equilibrium
 from hybrid.solve.stepper import LineFailed
 from tests.combinations.pairs import seen_by
-from tests.scenes import network_scene
+from tests.scenes import each_line, network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 LEG = {"length": 10.0, "mass": 1e-3, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
@@ -158,11 +158,8 @@ def test_a_start_of_many_cells_is_sought_from_on_no_others(monkeypatch: pytest.M
         raise LineFailed(0, Outcome.NOT_CONVERGED, None, None)
 
     monkeypatch.setattr(equilibrium, "_on_its_side", fails)
-    scene = slack_mooring()
-    for line in scene["lines"].values():
-        line["mesh"] = {"cells": 120}
     with pytest.raises(ComputationError):
-        hybrid.static(scene)
+        hybrid.static(each_line(slack_mooring(), mesh=120))
     assert len(cells) > 5 and {a == b for pairs in cells for a, b in pairs} == {True}
     assert {a for pairs in cells for a, _ in pairs} > {120}  # fewer ones, from the first places
 

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import extremes_facts
 from hybrid.view.summary import facts_of
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, each_line, pinned_at
 from tests.validation.test_validation_lines_contact import FORCES, ROPE, WEIGHT, crossing, force_between
 
 G, MASS, LENGTH = 9.81, 0.5, 4.0
@@ -95,10 +95,7 @@ def test_a_floor_that_moves_bears_what_its_force_is() -> None:
 def test_crossing_ropes_press_by_the_force_of_the_reference() -> None:
     """In N, whatever the cells are: what the one rope does to the other is what their pins lack."""
     for cells in (60, 100):
-        tables = crossing(0.1)
-        for line in tables["lines"].values():
-            line["mesh"] = {"cells": cells}
-        result = hybrid.static(tables)
+        result = hybrid.static(each_line(crossing(0.1), mesh=cells))
         force = result["contacts/upper/lower/force"][0]
         off, on = force_between(result, 0)
         assert force[2] == pytest.approx(off, rel=1e-3) and force[2] == pytest.approx(on, rel=1e-3)

@@ -22,9 +22,8 @@ from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import LinesWatch
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene, system_of
 from tests.simulation.test_system_contact import HOSE, network
-from tests.validation.test_validation_obstacles_of_lines import system_of
 from tests.validation.thrown_lines import WIDTH as D
 from tests.validation.thrown_lines import Throw, straight, throw
 
@@ -65,10 +64,7 @@ def force_between(result: Any, row: int) -> tuple[float, float]:
 @pytest.mark.parametrize(("drop", "cells"), [(0.05, 80), (0.2, 80), *((0.1, n) for n in (80, 100, 120, 140, 160))])
 def test_crossing_ropes_rest_on_each_other(drop: float, cells: int) -> None:
     """From the scene alone, the same on every mesh: without contact the upper rope would rest below the lower one."""
-    tables = crossing(drop)
-    for line in tables["lines"].values():
-        line["mesh"] = {"cells": cells}
-    result = hybrid.static(tables)
+    result = hybrid.static(each_line(crossing(drop), mesh=cells))
     off, on = force_between(result, 0)
     assert off == pytest.approx(on, rel=1e-6)
     assert on == pytest.approx(FORCES[drop], rel=0.005 if drop == 0.1 else 0.01)

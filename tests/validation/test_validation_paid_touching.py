@@ -77,10 +77,8 @@ def in_and_out(duration: float = 2.4) -> Tables:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
-    path = tmp_path_factory.mktemp("paid") / "whole.h5"
-    hybrid.run(in_and_out(), path, progress=False).close()
-    return hybrid.open(path)
+def whole() -> hybrid.Result:
+    return hybrid.run(in_and_out())
 
 
 def test_what_a_paid_rope_does_to_another_is_booked(whole: hybrid.Result) -> None:

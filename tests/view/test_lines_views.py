@@ -29,7 +29,8 @@ from hybrid.view.lines import AllLines, arms_of, clearest_view, motions, page, p
 from hybrid.view.matplotlib_backend import animate
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import _extreme_text, html
-from tests.scenes import network_scene
+from tests.scenes import each_line, network_scene
+from tests.simulation.bits import Stopping
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 ENDS = {"start": 0, "end": 11.5}
@@ -325,10 +326,8 @@ def test_commands_take_all_lines_or_one(path: Path, tmp_path: Path, monkeypatch:
 
 def test_an_equilibrium_is_drawn_as_one_picture_of_all_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    scene = spar()
+    scene = each_line(spar(), sections=[SECTION | {"bending_stiffness": 1e4}], model="rod")
     del scene["time"], scene["output"]["every"]
-    for line in scene["lines"].values():
-        line |= {"sections": [SECTION | {"bending_stiffness": 1e4}], "model": "rod"}
     Path("spar.yaml").write_text(json.dumps(scene))
     told = CliRunner().invoke(app, ["static", "spar.yaml", "--plot"])
     assert told.exit_code == 0 and "spar.static.png" in told.output
@@ -338,19 +337,10 @@ def test_an_equilibrium_is_drawn_as_one_picture_of_all_lines(tmp_path: Path, mon
 
 
 @pytest.mark.long
-def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
+def test_a_stopped_run_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file with fewer outputs than were asked for, and an equilibrium with one."""
-
-    def stop(progress: Any) -> None:
-        if progress.step >= 30:
-            raise KeyboardInterrupt
-
     target = tmp_path / "part.h5"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybrid.simulation.progress.REPORT_EVERY", -1.0)
-        patch.setattr("hybrid.solve.network_steps.CELL_STEPS", 1)  # a step a call
-        with pytest.raises(KeyboardInterrupt):
-            hybrid.run(spar(), target, progress=stop)
+    Stopping(monkeypatch).stop(30, hybrid.run, spar(), target)
     with hybrid.open(target) as part:
         assert part.status == "interrupted" and 1 < AllLines(part).outputs < 21
         assert "interrupted" in page(part).facts and "interrupted" in html(part).lower()
@@ -429,10 +419,7 @@ def test_the_table_of_many_lines_fits(
 
 
 def test_a_plan_of_many_lines_has_a_row_for_those_that_are_alike() -> None:
-    scene = fan()
-    for line in scene["lines"].values():
-        line["sections"] = [SECTION]
-    network = as_scene(scene)
+    network = as_scene(each_line(fan(), sections=[SECTION]))
     rows = plan_rows(network, hybrid.plan(network, measure=False))  # type: ignore[arg-type]
     assert any(x.startswith("14 lines ") and "120 m" in x for x in rows) and not any(
         x.startswith("line ") for x in rows
