@@ -17,7 +17,7 @@ import pytest
 
 pytestmark = extras.of_file("playwright")
 
-from browsed import Visited, opened_browser
+from browsed import Visited
 from PIL import Image
 from reported import reported
 
@@ -26,12 +26,6 @@ from hybrid.view.report import write_report
 
 DRAWN = "document.getElementById('plot-end-forces').classList.contains('drawn')"
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend 1.05 > 1 at s = 49 to 51 m"), (7.0, 0.0, 100.0, "snap", "a <b>peak</b>")]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with opened_browser() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")
