@@ -362,9 +362,8 @@ def test_steps_that_are_watched_go_on_from_a_checkpoint(tmp_path: Path) -> None:
     section = {"length": 30, "mass": 2, "axial_stiffness": 1e6}
     moved = {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 0.3, "period": 2}, "ramp": 2}}
     line = line_between("a", "b", section, model="catenary", mesh=12)
-    whole = resumed(
-        network_scene({"a": moved, "b": {"position": [20, 0, 0]}}, {"line": line}, time=(6, 0.25)), tmp_path, 4
-    )
+    points = {"a": moved, "b": {"position": [20, 0, 0]}}
+    whole = resumed(network_scene(points, {"line": line}, time=(6.0, 0.25), output=0.25), tmp_path, 4.0)
     assert "coarse step" in kinds(whole.lines["line"])
 
 

@@ -44,7 +44,7 @@ def one(**more: Any) -> dict[str, Any]:
         "ends": ends,
         "initial": "equilibrium",
         "model": zoned(ZONES),
-        "output": {"points": CELLS + 1},
+        "output": {"every": 0.1, "points": CELLS + 1},
     }
     return COMMON | scene | more
 
@@ -58,7 +58,7 @@ def line(start: str, end: str, zones: Any, connections: dict[str, Any]) -> dict[
 
 def several(lines: dict[str, Any], **points: Any) -> dict[str, Any]:
     points = {"a": {"position": A}, "b": {"position": B, "motion": MOTION}} | points
-    return COMMON | {"points": points, "lines": lines, "output": {"points": CELLS + 1}}
+    return COMMON | {"points": points, "lines": lines, "output": {"every": 0.1, "points": CELLS + 1}}
 
 
 CUT = {"cut": {"initial_guess": [16.0, 2.0, -8.0]}}
