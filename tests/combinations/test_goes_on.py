@@ -26,9 +26,8 @@ from tests.simulation.test_system_zones import mooring as slackening
 from tests.validation.test_validation_body_contact import pushed
 from tests.validation.test_validation_body_contact_of_lines import crossed
 from tests.validation.test_validation_lines_contact import lowered
-from tests.validation.test_validation_paid_touching import in_and_out
 from tests.validation.test_validation_sheaves import crossed_legs, two_ropes
-from tests.validation.test_validation_touching_zones import limp, with_zones
+from tests.validation.test_validation_touching_zones import in_and_out, limp, with_zones
 
 # Each feature is in one of these, ...
 FEATURES_TOGETHER = (

@@ -21,8 +21,7 @@ from hybrid.designs.numbers_and_results import changed_scene, number_of, parse_w
 from hybrid.designs.replay import course_of
 from hybrid.designs.tangents import NetworkOthers, Unfollowed
 from hybrid.kernels.state.report import PLANAR
-from tests.designs.test_in_motion import heaved, on_the_bed
-from tests.designs.test_system_tangents import asked_of
+from tests.designs.test_in_motion import asked_of, heaved, on_the_bed
 from tests.inside import calls_of
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
@@ -62,15 +61,12 @@ def twisted() -> dict[str, Any]:
         "length": 12.0, "mass": 6.0, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 40.0,
         "torsional_stiffness": 40.0, "damping": {"stiffness": 0.01},
     }  # fmt: skip
-    ends = {
-        "start": clamped_at([0, 0, 0], [1, 0, -1], normal=[0, 1, 0], turns=0.3),
-        "end": clamped_at([8, 1, 1], [1, 0, 1], normal=[0, 1, 0],
-                          motion={"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0})
-    }  # fmt: skip
-    return {
-        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 24},
-        "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.07, "points": 25},
-    }  # fmt: skip
+    moved = {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}
+    return cable_scene(
+        section, clamped_at([0, 0, 0], [1, 0, -1], normal=[0, 1, 0], turns=0.3),
+        clamped_at([8, 1, 1], [1, 0, 1], normal=[0, 1, 0], motion=moved), model="rod", mesh=24, time=(2.0, 0.02),
+        output=(0.07, 25)
+    )  # fmt: skip
 
 
 KEYS = [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.gravity", "ends.end.motion.heave.amplitude"]
