@@ -23,6 +23,7 @@ from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import pack, unpack
 from hybrid.zones import change as zone_changes
+from tests.inside import calls_of
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -426,18 +427,13 @@ def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeyp
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
     monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)  # 40 steps of 20 cells
     monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
-    places, kept, keep = [], [], record.Recorder.checkpoint
-
-    def noted(self, content):
-        keep(self, content)
-        places[-1].append(self.last)
-
-    monkeypatch.setattr(record.Recorder, "checkpoint", noted)
+    places, kept, last = [], [], calls_of(monkeypatch, record.Recorder, "checkpoint", after=lambda _, x, *__: x.last)
     for k, pause in enumerate((0.0, 1e9)):
         monkeypatch.setattr(record, "pause", lambda _, pause=pause: pause)
         monkeypatch.setattr(record, "_PART", 0.0)
-        places.append([])
         hybrid.run(swinging(), tmp_path / f"{k}.h5").close()
+        places.append([*last])
+        last.clear()
         with opened(tmp_path / f"{k}.h5") as file:
             points = [whole_file._checkpoint(unpack(bytes(file[name][()]))) for name in whole_file.SLOTS]
         kept.append([(x.number, x.t, x.rows, x.state["steps"]) for x in points])
