@@ -20,20 +20,15 @@ from hybrid.errors import SceneError
 from hybrid.scene.base import Invalid
 from hybrid.scene.read import as_scene
 from tests.designs.differences import agree
+from tests.scenes import cable_scene
 from tests.scenes import pinned_at as pinned
 
 G = 9.81
 
 
 def scene(section, start, end, model, cells, environment=None, **more):
-    return {
-        "environment": {"gravity": G} | (environment or {}),
-        "cable": {"sections": section if isinstance(section, list) else [section]},
-        "ends": {"start": start, "end": end},
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": cells},
-    } | more
+    around = {"gravity": G} | (environment or {})
+    return cable_scene(section, start, end, environment=around, model=model, mesh=cells) | more
 
 
 def test_a_hanging_line():

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.linear.loaded_line import turning_doubts
 from hybrid.linear.response_results import of_few, phases_of
-from tests.scenes import each_line, line_between, network_scene
+from tests.scenes import cable_scene, each_line, line_between, network_scene, pinned_at
 from tests.simulation.test_vortices import G, body, floating, scene, small_body
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
@@ -220,12 +220,8 @@ def test_tension_of_a_line_with_a_heavy_float_near_its_resonance():
     rope = {"length": 183.0, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "added_mass": {"normal": 1.0}}
     held = {"kind": "float", "at": 91.5, "buoyancy": 1.2e5, "mass": 1.2e4, "drag_area": 5.8, "added_mass": 2.17e4}
     sea = sunken(0.4, 0.0)["environment"]
-    places = {"start": [-60, 0, -90], "end": [60, 0, -90]}
-    tables = {
-        "environment": sea, "cable": {"sections": [rope], "attachments": [held]}, "model": "catenary",
-        "ends": {k: {"kind": "pinned", "position": x} for k, x in places.items()},
-        "initial": "equilibrium", "mesh": {"cells": 16},
-    }  # fmt: skip
+    ends = pinned_at(-60, 0, -90), pinned_at(60, 0, -90)
+    tables = cable_scene(rope, *ends, attachments=[held], environment=sea, model="catenary", mesh=16)
     found = hybrid.response(tables)
     line, time = found.lines["cable"], {"duration": 1800.0, "step": 0.1}
     with hybrid.run(tables | {"time": time, "output": {"every": 0.5, "points": 17}}) as run:

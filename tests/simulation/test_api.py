@@ -20,15 +20,12 @@ from hybrid.scene.read import as_scene
 from hybrid.simulation import first_use
 from hybrid.simulation.progress import Progress
 from tests.inside import calls_of
+from tests.scenes import cable_scene, pinned_at
 
-WIRE: dict[str, Any] = {
-    "cable": {"sections": [{"length": 2.0, "mass": 1.0}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, -20]}},
-    "initial": "equilibrium",
-    "model": "catenary",
-    "mesh": {"cells": 4},
-    "time": {"duration": 0.1, "step": 0.05},
-}
+WIRE = cable_scene(
+    {"length": 2.0, "mass": 1.0}, pinned_at(0, 0, 0), {"kind": "free", "force": [0, 0, -20]}, model="catenary", mesh=4,
+    time=(0.1, 0.05)
+)  # fmt: skip
 # Let go and pushed upwards: it goes into compression.
 PUSHED = WIRE | {
     "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, 400.0]}},
@@ -222,11 +219,10 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
         if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
     }
     assert used - others <= {x.__qualname__ for x in first_use.payout_kernels()}
-    ends = {"start": {"kind": "free"}, "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 60}}}
-    scene = hybrid.validate_scene({
-        "cable": {"sections": [{"length": 40.0, "mass": 2.0}]}, "ends": ends, "initial": "equilibrium",
-        "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 10, "step": 0.05},
-    })  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        {"length": 40.0, "mass": 2.0}, {"kind": "free"}, pinned_at(0, 0, 0, payout={"longest": 60}), model="catenary",
+        mesh=20, time=(10, 0.05)
+    ))  # fmt: skip
     paid = first_use.PAYOUT_OF_LINES[0]
     assert paid in first_use.kernels_of(scene)
     assert paid not in first_use.kernels_of(scene, static=True)
@@ -239,11 +235,8 @@ TIME = {"time": {"duration": 0.1, "step": 0.05}}
 
 
 def one(section: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:
-    ends = {name: {"kind": "pinned", "position": POINTS[at]["position"]} for name, at in (("start", "a"), ("end", "b"))}
-    return {
-        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": model, "mesh": {"cells": 12},
-        "contact": {"self": False},
-    } | TIME | more  # fmt: skip
+    ends = (pinned_at(*POINTS[at]["position"]) for at in "ab")
+    return cable_scene(section, *ends, model=model, mesh=12, contact={"self": False}) | TIME | more
 
 
 def named(section: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:

@@ -76,12 +76,9 @@ def test_cells_behind_a_clamped_winch_are_short_where_no_mesh_is_given(rate: flo
     other = {"end": "start", "start": "end"}[side]
     tangent = [1.0 if side == "end" else -1.0, 0.0, 0.0]
     section = {"length": 100.0, "mass": 8.0, "axial_stiffness": 1e7, "bending_stiffness": 1e3}
-    scene: dict[str, Any] = {
-        "cable": {"sections": [section]},
-        "ends": {other: pinned_at(0, 0, -45),
-                 side: clamped_at([75, 0, 0], tangent, payout={"rates": [[0, 0], [1, rate]]})},
-        "initial": "equilibrium", "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 1.0, "errors": False}
-    }  # fmt: skip
+    held = clamped_at([75, 0, 0], tangent, payout={"rates": [[0, 0], [1, rate]]})
+    ends = {other: pinned_at(0, 0, -45), side: held}
+    scene = cable_scene(section, **ends, time=(4.0, 0.1), output={"every": 1.0, "errors": False})
     found = hybrid.run(scene | {"model": {"kind": "adaptive", "curvature_error": 0.05}})
     fine = hybrid.run(scene | {"model": "rod", "mesh": {"cells": 400}})
     assert "unresolved bend" not in {event.kind for event in found.events}
@@ -187,11 +184,9 @@ def test_torque_stays_even_where_nodes_enter_and_leave(winch: str, rate: float, 
     held = {"kind": "clamped", "position": [0, 0, 0], **up, "payout": {"rate": rate, "ramp": 0.2}}
     turned = {winch: held, far: pulled}
     turned["end"] |= {"turns": 1}
-    result = hybrid.run({
-        "cable": {"sections": [section | {"torsional_stiffness": 0.16}]}, "model": "rod", "mesh": {"cells": 40},
-        "ends": turned, "initial": "equilibrium", "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.02},
-        "dimension": 3, **more,
-    })  # fmt: skip
+    section |= {"torsional_stiffness": 0.16}
+    given = cable_scene(section, **turned, model="rod", mesh=40, time=(1.5, 0.01), output=0.02, dimension=3)
+    result = hybrid.run(given | more)
     length = result["payout/length"]
     assert abs(length[-1] - length[0]) > 5 * out / 40  # nodes have entered, or left
     expected = 2.0 * np.pi * 0.16 / length

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 WIDTH, RUBS = 0.02, {"self": True, "friction": 0.3}
 HOSE = {
@@ -34,13 +34,11 @@ def network(**more: Any) -> dict[str, Any]:
 def test_a_line_touches_itself_as_one_cable_does() -> None:
     """The same as a rod and a catenary of one cable, whose joint is the free point."""
     cells = [*np.linspace(0.0, 4.0, 81), 4.1, 4.2, 4.3, 4.4, 4.5]
-    alone = hybrid.run({
-        "cable": {"sections": [HOSE, TAIL]}, "contact": RUBS, "initial": "equilibrium",
-        "model": {"zones": [{"rod": 4.0}, {"catenary": 0.5}]}, "mesh": {"nodes": [float(x) for x in cells]},
-        "ends": {"start": {"kind": "pinned", "position": LOW, "motion": CLOSER},
-                 "end": {"kind": "pinned", "position": HIGH}},
-        "time": TIME, "output": OUTPUT | {"points": 91}, "dimension": 3,
-    }, progress=False)  # fmt: skip
+    alone = hybrid.run(cable_scene(
+        [HOSE, TAIL], pinned_at(*LOW, motion=CLOSER), pinned_at(*HIGH), contact=RUBS, time=TIME, dimension=3,
+        model={"zones": [{"rod": 4.0}, {"catenary": 0.5}]}, mesh={"nodes": [float(x) for x in cells]},
+        output=OUTPUT | {"points": 91}
+    ), progress=False)  # fmt: skip
     with hybrid.run(network()) as result:
         hose = result.lines["hose"]
         assert {"line touches itself"} <= {event.kind for event in hose.events}

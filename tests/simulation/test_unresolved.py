@@ -91,10 +91,7 @@ def laid(cells: int, **more: Any) -> dict[str, Any]:
         "length": 240, "diameter": DIAMETER, "mass": 1.5, "axial_stiffness": 2e7, "bending_stiffness": EI,
         "drag": {"normal": 1.2},
     }  # fmt: skip
-    return {
-        "environment": sea, "cable": {"sections": [section]}, "ends": ENDS, "dimension": 2, "initial": "equilibrium",
-        "model": "rod", "time": {"duration": 0.2, "step": 0.05}, "mesh": {"cells": cells},
-    } | more  # fmt: skip
+    return cable_scene(section, **ENDS, **sea, dimension=2, model="rod", time=(0.2, 0.05), mesh=cells) | more
 
 
 def test_a_rod_on_cells_longer_than_its_bend(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from hybrid.view.lines import AllLines, arms_of, clearest_view, motions, page, p
 from hybrid.view.matplotlib_backend import animate
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import _extreme_text, html
-from tests.scenes import each_line, network_scene
+from tests.scenes import cable_scene, clamped_at, each_line, network_scene, pinned_at
 from tests.simulation.bits import Stopping
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
@@ -214,10 +214,9 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
 @pytest.fixture(scope="module", params=[as_scene, in_full])
 def alone(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
     """A line without a name, and the same with one."""
-    ends = {name: {"kind": "pinned", "position": [x, 0, 0]} for name, x in ENDS.items()}
+    ends = {name: pinned_at(x, 0, 0) for name, x in ENDS.items()}
     section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
-    asked = {"cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 40}}
-    asked |= {"initial": "equilibrium", "time": {"duration": 0.4, "step": 0.1}, "output": {"every": 0.1, "points": 11}}
+    asked = cable_scene(section, **ends, model="adaptive", mesh=40, time=(0.4, 0.1), output=(0.1, 11))
     return hybrid.run(request.param(as_scene(asked)), tmp_path_factory.mktemp("alone") / "run.h5")
 
 
@@ -259,12 +258,9 @@ def test_zones_and_the_search_are_said_of_one_line_and_of_many(
     form: Callable[[Any], hybrid.Scene], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of lines with names how much was rod was not said, and how the equilibrium was found behind the file alone."""
-    ends = {name: {"kind": "clamped", "position": [x, 0, 0], "tangent": [1, 0, 0]} for name, x in ENDS.items()}
+    ends = {name: clamped_at([x, 0, 0], [1, 0, 0]) for name, x in ENDS.items()}
     section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
-    asked = form(as_scene({
-        "cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 60},
-        "initial": "equilibrium", "time": {"duration": 0.2, "step": 0.1},
-    }))  # fmt: skip
+    asked = form(as_scene(cable_scene(section, **ends, model="adaptive", mesh=60, time=(0.2, 0.1))))
     show_motion(Console(False, False), asked, hybrid.run(asked), Path("run.h5"))
     moved = capsys.readouterr().out
     assert re.search(r"rod: \d+% of the line, all the time|rod: \d+% to \d+% of the line", moved)
