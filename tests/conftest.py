@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -43,6 +44,15 @@ class Row:
     figure: str
     acceptance: str
     node: str
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A browser without a screen; tests that ask for it skip where there is none."""
+    from browsed import opened_browser
+
+    with opened_browser() as opened:
+        yield opened
 
 
 ROWS = pytest.StashKey[list[Row]]()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
+
+import pytest
 
 import hybrid
 from hybrid.kernels.machine.compile import kernel
@@ -19,6 +22,26 @@ from hybrid.solve.contact import SelfContact
 def never_due(table):
     """In place of `hybrid.simulation.cell_changes.cells_due`: cells change in Python alone."""
     return 0
+
+
+def calls_of(
+    monkeypatch: pytest.MonkeyPatch, owner: Any, name: str,
+    note: Callable[..., Any] = lambda *_: None, after: Callable[..., Any] | None = None,
+) -> list[Any]:  # fmt: skip
+    """What `note` says of each call of `owner.name` before it is made as ever, or `after` of what it returned."""
+    found: list[Any] = []
+    goes = getattr(owner, name)
+
+    def noted(*given: Any, **more: Any) -> Any:
+        if after is None:
+            found.append(note(*given))
+        returned = goes(*given, **more)
+        if after is not None:
+            found.append(after(returned, *given))
+        return returned
+
+    monkeypatch.setattr(owner, name, noted)
+    return found
 
 
 class OnlyLine:

@@ -36,6 +36,16 @@ def kinds(result: Any) -> set[str]:
     return {event.kind for event in result.events}
 
 
+def of_kind(result: Any, kind: str) -> list[Any]:
+    """Events of a kind."""
+    return [event for event in result.events if event.kind == kind]
+
+
+def texts_of(result: Any, kind: str) -> list[str]:
+    """What events of a kind say."""
+    return [event.text for event in of_kind(result, kind)]
+
+
 def work_put_in(result: Any) -> float:
     """The largest work of each kind, together, J."""
     names = (x for x in result.names if x.startswith("work/") and x != "work/scheme")

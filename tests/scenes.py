@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from hybrid.scene.network import Network
+from hybrid.scene.read import as_scene
+
 Tables = dict[str, Any]
 # What may be said without a table: cells; duration and step, s; interval of outputs, s, and how many points they have.
 SHORT = {"mesh": ("cells",), "time": ("duration", "step", "rho_inf"), "output": ("every", "points")}
@@ -60,3 +63,15 @@ def line_between(start: str, end: str, sections: Tables | list[Tables], **tables
     """A line of a network; tables as in `in_tables`."""
     own = [sections] if isinstance(sections, dict) else sections
     return {"start": start, "end": end, "sections": own} | in_tables(tables)
+
+
+def each_line(tables: Tables, **given: Any) -> Tables:
+    """The scene of a network with these tables, as in `in_tables`, in each of its lines."""
+    return tables | {"lines": {name: line | in_tables(given) for name, line in tables["lines"].items()}}
+
+
+def system_of(tables: Tables) -> Network:
+    """The scene of a network, validated."""
+    found = as_scene(tables)
+    assert isinstance(found, Network)
+    return found

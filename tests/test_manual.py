@@ -15,7 +15,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from test_report_browser import browser  # noqa: F401  # a fixture
 
 import hybrid
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, Outcome
@@ -195,7 +194,7 @@ def test_the_site_is_built_strictly_and_asks_no_other_host(site: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_link_to_a_closed_table_opens_it(site: Path, browser: Any) -> None:  # noqa: F811
+def test_a_link_to_a_closed_table_opens_it(site: Path, browser: Any) -> None:
     page = browser.new_page(viewport={"width": 400, "height": 800})
     page.goto((site / "scene.html").as_uri() + "#section")
     is_open = "name => document.getElementById(name).parentElement.querySelector(`#${name} ~ details`).open"

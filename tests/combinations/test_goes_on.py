@@ -15,6 +15,7 @@ import pytest
 import hybrid
 from tests.combinations.pairs import END, FEATURES, as_network, scene_of
 from tests.problems import tables_with
+from tests.scenes import line_between, network_scene
 from tests.simulation.bits import Stopping, differences, went_on
 from tests.simulation.test_one_world import between_springs
 from tests.simulation.test_releases import scene_break as carried
@@ -26,9 +27,8 @@ from tests.simulation.test_system_zones import mooring as slackening
 from tests.validation.test_validation_body_contact import pushed
 from tests.validation.test_validation_body_contact_of_lines import crossed
 from tests.validation.test_validation_lines_contact import lowered
-from tests.validation.test_validation_paid_touching import in_and_out
 from tests.validation.test_validation_sheaves import crossed_legs, two_ropes
-from tests.validation.test_validation_touching_zones import limp, with_zones
+from tests.validation.test_validation_touching_zones import in_and_out, limp, with_zones
 
 # Each feature is in one of these, ...
 FEATURES_TOGETHER = (
@@ -123,6 +123,8 @@ def test_steps_are_taken_back(names: tuple[str, ...], network: bool) -> None:
 
 
 # Of several lines.
+ROPE = {"length": 50.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
+HEAVES = {"heave": {"amplitude": 1.0, "period": 3.0}, "ramp": 1.0}
 BREAKS = carried({"b": {"break_at": {"time": 0.5}}}, {"left": {"break_at": {"time": 0.8}}})
 NETWORKS = {
     "friction on a bed, waves": tables_with(mooring(), {"time.duration": 4.0, "output": {"every": 0.4}}),
@@ -151,6 +153,17 @@ NETWORKS = {
     "a ball on lines that touch": crossed(),
     "legs that touch over a sheave": crossed_legs(0.02, held=False),
     "two ropes over a sheave": tables_with(two_ropes(), {"time.duration": 0.4}),
+    "paid out at its start to a weight": network_scene(
+        {"ship": {"position": [0, 0, 0]}, "weight": {"initial_guess": [30, 0, -40], "mass": 20.0, "volume": 0.01}},
+        {"rope": line_between("ship", "weight", ROPE, mesh=10, connections={"start": {"payout": {"rate": 2.0}}})},
+        environment={"fluid": {"density": 1025.0, "current": [0.5, 0, 0]}}, time=(1.0, 0.02), output={"every": 0.1},
+    ),
+    "errors, on a bed": network_scene(
+        {"west": {"position": [0, 0, -20]}, "east": {"position": [45, 0, 0], "motion": HEAVES}},
+        {"rope": line_between("west", "east", ROPE | {"length": 60.0}, mesh=20, model="rod")},
+        environment={"fluid": {"density": 1025.0}, "seabed": {"z": -20, "stiffness": 1e4}},
+        time=(1.0, 0.02), output={"every": 0.1, "errors": True},
+    ),
     "paid out fast": as_network(tables_with(scene_of("payout"), {END + ".payout": {"rate": 2.0, "ramp": 0.1}})),
 }
 

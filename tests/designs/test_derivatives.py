@@ -20,23 +20,15 @@ from hybrid.errors import SceneError
 from hybrid.scene.base import Invalid
 from hybrid.scene.read import as_scene
 from tests.designs.differences import agree
+from tests.scenes import cable_scene
+from tests.scenes import pinned_at as pinned
 
 G = 9.81
 
 
 def scene(section, start, end, model, cells, environment=None, **more):
-    return {
-        "environment": {"gravity": G} | (environment or {}),
-        "cable": {"sections": section if isinstance(section, list) else [section]},
-        "ends": {"start": start, "end": end},
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": cells},
-    } | more
-
-
-def pinned(*place):
-    return {"kind": "pinned", "position": list(place)}
+    around = {"gravity": G} | (environment or {})
+    return cable_scene(section, start, end, environment=around, model=model, mesh=cells) | more
 
 
 def test_a_hanging_line():
@@ -303,12 +295,8 @@ def test_the_command_seek(tmp_path, monkeypatch):
 def chain_leg(cells: int) -> dict:
     """400 m of chain on a bed 100 m down, its upper end 370 m away."""
     section = {"length": 400, "mass": 100, "diameter": 0.12, "axial_stiffness": 5e8, "drag": {"normal": 2.4}}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -100, "stiffness": 5e4}},
-        "cable": {"sections": [section]}, "initial": "equilibrium", "model": "catenary", "mesh": {"cells": cells},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -100]},
-                 "end": {"kind": "pinned", "position": [370, 0, -5]}},
-    }  # fmt: skip
+    sea = {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -100, "stiffness": 5e4}}
+    return scene(section, pinned(0, 0, -100), pinned(370, 0, -5), "catenary", cells, sea)
 
 
 def test_the_error_of_a_derivative_on_a_bed_covers_it():

@@ -204,10 +204,9 @@ def test_a_constant_that_is_added_hides_no_optimum(added):
 
 def test_a_result_that_is_not_there_is_said():
     """Where a line touches the bed, of a line that hangs above it."""
-    ends = {k: {"kind": "pinned", "position": [x, 0, z]} for k, x, z in (("start", 0.0, -5.0), ("end", 80.0, 0.0))}
     section = {"length": 84.0, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 1e7}
-    scene = {"environment": WATER, "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium",
-             "model": "catenary", "mesh": {"cells": 40}}  # fmt: skip
+    ends = pinned_at(0.0, 0, -5.0), pinned_at(80.0, 0, 0.0)
+    scene = cable_scene(section, *ends, environment=WATER, model="catenary", mesh=40)
     unknowns = {"length": {"key": LENGTH, "low": 81, "high": 200}}
     targets = {"top": {"quantity": "tension", "at": "end", "value": 9000.0},
                "lies": {"quantity": "touchdown", "value": 20.0}}  # fmt: skip

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.errors import ResultError, SceneError
 from hybrid.store.study_file import StudyFile
 from hybrid.view.several_runs import html
+from tests.called import Call
+from tests.studies.test_study import SCENE as OF_HEAVE
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "SALib")
 
@@ -27,18 +28,9 @@ model: catenary
 mesh: {cells: 6}
 """
 SPAN = CHAIN.replace("end: free", "end: {kind: pinned, position: [100, 0, 0]}").replace("length: 40", "length: 105")
-HEAVE = """
-environment: {fluid: {density: 1025}}
-cable:
-  sections: [{length: 60, mass: 8, diameter: 0.04, axial_stiffness: 1.0e+7, drag: {normal: 1.2}}]
-ends:
-  start: {kind: pinned, position: [0, 0, -40]}
-  end: {kind: pinned, position: [35, 0, 0], motion: {heave: {amplitude: 1.0, period: 5.0}, ramp: 2}}
-initial: equilibrium
-model: catenary
-mesh: {cells: 16}
-time: {duration: 4, step: 0.1}
-"""
+HEAVE = (
+    OF_HEAVE.replace("ramp: 5", "ramp: 2").replace("duration: 6", "duration: 4").replace("output: {every: 0.5}\n", "")
+)
 BOTH = {"m": {"key": MASS, "low": 4.0, "high": 6.0}, "L": {"key": LENGTH, "low": 30.0, "high": 50.0}}
 TOP = {"top": {"quantity": "tension", "at": 0.0}}
 
@@ -185,12 +177,10 @@ def test_what_is_kept_otherwise_is_refused(tmp_path: Path):
 
 
 @pytest.mark.long
-def test_the_command_and_the_report(chain: Path, capsys: pytest.CaptureFixture[str]):
+def test_the_command_and_the_report(chain: Path, call: Call):
     def said(*words: str) -> str:
-        with pytest.raises(SystemExit) as left:
-            main(["study", str(chain), *words])
-        told = capsys.readouterr()
-        assert not left.value.code, told
+        told = call("study", str(chain), *words)
+        assert not told.code, told
         return told.out + told.err
 
     assert "Shares of the spread" not in html(chain) or "shares" in hybrid.open_study(chain).attrs
@@ -204,6 +194,4 @@ def test_the_command_and_the_report(chain: Path, capsys: pytest.CaptureFixture[s
     rows = [json.loads(x) for x in said("--sensitivity", "top", "--derivatives", "--json").splitlines()]
     (row,) = [x for x in rows if x.get("r2")]
     assert row["rows"][0]["variable"] == "L"
-    with pytest.raises(SystemExit) as left:
-        main(["study", str(chain), "--derivatives"])
-    assert left.value.code == 1
+    assert call("study", str(chain), "--derivatives").code == 1

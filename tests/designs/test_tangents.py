@@ -21,8 +21,8 @@ from hybrid.designs.numbers_and_results import changed_scene, number_of, parse_w
 from hybrid.designs.replay import course_of
 from hybrid.designs.tangents import NetworkOthers, Unfollowed
 from hybrid.kernels.state.report import PLANAR
-from tests.designs.test_in_motion import heaved, on_the_bed
-from tests.designs.test_system_tangents import asked_of
+from tests.designs.test_in_motion import asked_of, heaved, on_the_bed
+from tests.inside import calls_of
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
@@ -61,15 +61,12 @@ def twisted() -> dict[str, Any]:
         "length": 12.0, "mass": 6.0, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 40.0,
         "torsional_stiffness": 40.0, "damping": {"stiffness": 0.01},
     }  # fmt: skip
-    ends = {
-        "start": clamped_at([0, 0, 0], [1, 0, -1], normal=[0, 1, 0], turns=0.3),
-        "end": clamped_at([8, 1, 1], [1, 0, 1], normal=[0, 1, 0],
-                          motion={"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0})
-    }  # fmt: skip
-    return {
-        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 24},
-        "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.07, "points": 25},
-    }  # fmt: skip
+    moved = {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0}
+    return cable_scene(
+        section, clamped_at([0, 0, 0], [1, 0, -1], normal=[0, 1, 0], turns=0.3),
+        clamped_at([8, 1, 1], [1, 0, 1], normal=[0, 1, 0], motion=moved), model="rod", mesh=24, time=(2.0, 0.02),
+        output=(0.07, 25)
+    )  # fmt: skip
 
 
 KEYS = [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.gravity", "ends.end.motion.heave.amplitude"]
@@ -86,13 +83,9 @@ def test_a_touchdown_that_moves(model: str) -> None:
 def test_a_line_in_a_plane_is_followed_in_it(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same tangents as in space, where it goes by a number that moves its plane."""
     tables, of, found = on_the_bed(model), ["last tension@start", "std position.z@150", "max tension@end"], []
-    plain, bits = NetworkOthers._call_each_step, list[int]()
-
-    def follow(self: NetworkOthers, reports: Any) -> None:
-        plain(self, reports)
-        bits.append(self._model.models[0].line.bits & PLANAR)
-
-    monkeypatch.setattr(NetworkOthers, "_call_each_step", follow)
+    bits = calls_of(
+        monkeypatch, NetworkOthers, "_call_each_step", after=lambda _, x, *__: x._model.models[0].line.bits & PLANAR
+    )
     tables["time"]["duration"] = 2.0
     for dimension, beside in ((None, []), (3, []), (None, ["ends.end.position[1]"])):
         scene = hybrid.validate_scene(tables | ({"dimension": dimension} if dimension else {}))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.designs.differences import agree
-from tests.modal.test_touching import drum, over_sheave
+from tests.modal.test_on_obstacles import drum, over_sheave
 
 Tables = dict[str, Any]
 ROPE = "lines.rope.sections[0]."

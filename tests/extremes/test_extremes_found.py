@@ -9,10 +9,7 @@ from extreme import MODELS, X, clamped, free, pinned, scene
 from rods import rod
 
 import hybrid
-
-
-def kinds(result) -> list[str]:
-    return [event.kind for event in result.events]
+from tests.said import kinds
 
 
 def solved(tables):

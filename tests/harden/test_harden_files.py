@@ -9,7 +9,6 @@ of its own, and crashes are counted:
 from __future__ import annotations
 
 import json
-import os
 import queue
 import shutil
 import signal
@@ -59,18 +58,8 @@ def opened(good: Path, numbers: range, plot_every: int) -> tuple[Counter[str], l
     bad: list[str] = []
     number = numbers.start
     while number < numbers.stop:
-        asked = [
-            sys.executable,
-            str(WORKER),
-            str(good),
-            str(good.parent),
-            str(number),
-            str(numbers.stop),
-            str(plot_every),
-        ]
-        worker = subprocess.Popen(
-            asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ)
-        )
+        asked = [sys.executable, *map(str, (WORKER, good, good.parent, number, numbers.stop, plot_every))]
+        worker = subprocess.Popen(asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         lines: queue.Queue[str] = queue.Queue()
         reader = threading.Thread(target=_pass_on, args=(worker, lines))
         reader.start()

@@ -19,6 +19,8 @@ from hybrid.kernels.machine.cache import LEVELS, compiler_hash, processor, tempo
 from hybrid.kernels.machine.compile import kernel, linked_kernel
 from hybrid.kernels.machine.kept_code import KeptCode
 from hybrid.kernels.machine.references import caller, linked
+from tests.inside import calls_of
+from tests.scenes import cable_scene, pinned_at
 
 PACKAGE = Path(hybrid.__file__).parent
 
@@ -297,16 +299,11 @@ def test_a_law_that_cannot_be_compiled_ends_what_calls_it_and_nothing_before(mon
 
 
 def test_laws_that_a_scene_does_not_have_are_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: set[str] = set()
-    taking = KeptCode.taking
-    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (asked.add(self._name), taking(self, args))[1])
-    scene = {
-        "cable": {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 1}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 0]}},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 8}, "time": {"duration": 0.2, "step": 0.1},
-    }  # fmt: skip
-    hybrid.run(scene, progress=False).close()
+    asked = calls_of(monkeypatch, KeptCode, "taking", lambda code, _: code._name)
+    section = {"length": 10, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 1}
+    ends = pinned_at(0, 0, 0), pinned_at(9, 0, 0)
+    hybrid.run(cable_scene(section, *ends, model="rod", mesh=8, time=(0.2, 0.1)), progress=False).close()
     names = {x.removeprefix("hybrid.kernels.") for x in linked if ".laws." in x}
     assert {"laws.obstacles.passes", "laws.seabed.update_soil"} < names
     assert "run.network.begin_line" in asked
-    assert not asked & names
+    assert not {*asked} & names

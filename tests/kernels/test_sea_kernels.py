@@ -25,6 +25,7 @@ from hybrid.kernels.watch.tangents import PHASES, SLOPES, wave_slopes, waves_bes
 from hybrid.model.sea import HIGHEST, LOWEST, Surroundings, components, current_table, jonswap, surroundings
 from hybrid.scene.wave_theory import JonswapWaves, steady_wave
 from hybrid.scene.waves import FINE, RegularWaves, StreamFunctionWaves, shares
+from tests.scenes import cable_scene, pinned_at
 
 
 def entry(law):
@@ -116,14 +117,9 @@ def test_power_law_table():
 
 
 def _scene(fluid, **environment):
+    section, around = {"length": 10, "mass": 5.0, "diameter": 0.05}, {"fluid": fluid, **environment}
     return hybrid.validate_scene(
-        {
-            "environment": {"fluid": fluid, **environment},
-            "cable": {"sections": [{"length": 10, "mass": 5.0, "diameter": 0.05}]},
-            "ends": {"start": {"kind": "pinned", "position": [0, 0, -5]}, "end": "free"},
-            "initial": "equilibrium",
-            "model": "catenary",
-        }
+        cable_scene(section, pinned_at(0, 0, -5), "free", environment=around, model="catenary")
     )
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import random
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +16,10 @@ import pytest
 
 pytestmark = extras.of_file("playwright", "starlette", "uvicorn", "websockets")
 
-from browsed import Visited, opened_browser
+from browsed import Visited
 from viewed import SCENE, random_edit, served
 
 LONG = 400.0  # s: kernels may have to be compiled
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with opened_browser() as opened:
-        yield opened
 
 
 class Visit(Visited):

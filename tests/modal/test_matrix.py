@@ -11,6 +11,7 @@ from hybrid.designs.network_at_rest import at_rest
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.linear.matrices import linear_line
 from hybrid.solve.stepper import JoinedLine
+from tests.scenes import cable_scene, clamped_at
 from tests.solve.test_bed_of_depths import hill, mooring
 
 ROD = {
@@ -28,14 +29,11 @@ FLOAT = {"kind": "float", "at": 50.0, "mass": 20.0, "volume": 1.2, "height": 1.0
 
 def scene(surface=15.0, attachments=(), without=(), current=(0.5, 0.1, 0.0), more=None, **section):
     """A rod in a current, clamped at both ends."""
-    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 1], "normal": [0, 1, 0]}
-    end = {"kind": "clamped", "position": [60, 0, 20], "tangent": [1, 0, 0.6], "normal": [0, 1, 0]}
-    sections = [{key: x for key, x in (ROD | section).items() if key not in without}]
-    return hybrid.validate_scene({
-        "environment": {"fluid": {"density": 1025, "surface": surface, "current": current}},
-        "cable": {"sections": sections, "attachments": [*attachments]}, "ends": {"start": start, "end": end},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 14},
-    } | (more or {}))  # fmt: skip
+    section = {key: x for key, x in (ROD | section).items() if key not in without}
+    return hybrid.validate_scene(cable_scene(
+        section, clamped_at([0, 0, 0], [1, 0, 1], normal=[0, 1, 0]), clamped_at([60, 0, 20], [1, 0, 0.6], normal=[0, 1, 0]),
+        attachments=[*attachments], fluid={"density": 1025, "surface": surface, "current": current}, model="rod", mesh=14
+    ) | (more or {}))  # fmt: skip
 
 
 SCENES = {

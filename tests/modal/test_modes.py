@@ -15,13 +15,10 @@ from hybrid.linear.eigen import _every, _nearest
 from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import _modes_on_mesh, equilibrium_of
 from hybrid.scene.read import as_scene
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, line_between, network_scene
+from tests.scenes import pinned_at as pinned
 
 G = 9.81
-
-
-def pinned(*place, **more):
-    return {"kind": "pinned", "position": list(place)} | more
 
 
 def clamped(*place, **more):
@@ -29,16 +26,7 @@ def clamped(*place, **more):
 
 
 def scene(sections, start, end, model, cells, gravity=0.0, **more):
-    environment = {"gravity": gravity} | more.pop("environment", {})
-    sections = sections if isinstance(sections, list) else [sections]
-    cable = {"sections": sections} | more.pop("cable", {})
-    tables = {
-        "environment": environment,
-        "cable": cable,
-        "ends": {"start": start, "end": end},
-        "initial": "equilibrium",
-    }
-    return hybrid.validate_scene(tables | {"model": model, "mesh": {"cells": cells}} | more)
+    return hybrid.validate_scene(cable_scene(sections, start, end, gravity=gravity, model=model, mesh=cells, **more))
 
 
 def string(cells, **more):
@@ -51,10 +39,10 @@ def chain(cells):
     return scene({"length": 10.0, "mass": 1.0}, pinned(0, 0, 0), {"kind": "free"}, "catenary", cells, G)
 
 
-def sag(cells):
-    """Span of 100 m with 1/77 of sag; lambda^2 = 19.2."""
+def sag(cells, x=100.0, y=0.0, **more):
+    """Span of 100 m with 1/77 of sag; lambda^2 = 19.2; x, y, more: of its end."""
     section = {"length": 99.990048, "mass": 10.0, "axial_stiffness": 2e8}
-    return scene(section, pinned(0, 0, 0), pinned(100, 0, 0), "catenary", cells, G)
+    return scene(section, pinned(0, 0, 0), pinned(x, y, 0, **more), "catenary", cells, G)
 
 
 def omega(found):
@@ -135,7 +123,7 @@ def test_twist_of_a_rod():
 
 def test_mass_on_a_string():
     """1000 kg in the middle of two strings of 50 m: x tan x = 1."""
-    made = string(200, cable={"attachments": [{"kind": "clump", "at": 50.0, "mass": 1000.0}]})
+    made = string(200, attachments=[{"kind": "clump", "at": 50.0, "mass": 1000.0}])
     found = omega(hybrid.modes(made, 2))
     np.testing.assert_allclose(found, 1.720667, rtol=2e-4)
 
@@ -215,7 +203,7 @@ def test_riser_of_huera_huarte():
     height = 13.12 + pull - 0.5 * weight * 13.12 / 1e9
     made = scene(
         section, pinned(0, 0, -20), pinned(0, 0, -20 + height), "rod", 200, G,
-        environment={"fluid": {"density": 1000.0, "surface": 0.0}},
+        fluid={"density": 1000.0, "surface": 0.0},
     )  # fmt: skip
     found = [x for x in hybrid.modes(made, 12).modes if x.what != "twist"]
     hertz = np.array([x.frequency for x in found])[::2]
@@ -247,9 +235,7 @@ def test_nearest_to_a_period():
 def test_turned_scenes_have_the_same_periods():
     """About the vertical."""
     c, s = math.cos(0.7), math.sin(0.7)
-    section = {"length": 99.990048, "mass": 10.0, "axial_stiffness": 2e8}
-    turned = scene(section, pinned(0, 0, 0), pinned(100 * c, 100 * s, 0), "catenary", 60, G)
-    one, found = hybrid.modes(sag(60), 6), hybrid.modes(turned, 6)
+    one, found = hybrid.modes(sag(60), 6), hybrid.modes(sag(60, 100 * c, 100 * s), 6)
     np.testing.assert_allclose(omega(found), omega(one), rtol=1e-9)
     assert [x.what for x in found.modes] == [x.what for x in one.modes]
 
@@ -327,8 +313,8 @@ PIPE = network_scene(
 @pytest.mark.long  # 2.7 s
 def test_friction_holds_what_lies_on_the_bed():
     section = {"length": 60.0, "mass": 5.0, "axial_stiffness": 1e7}
-    bed = {"seabed": {"z": 0.0, "stiffness": 1e5, "friction": 0.6}}
-    made = scene(section, pinned(0, 0, 0), pinned(45, 0, 20), "catenary", 60, G, environment=bed)
+    bed = {"z": 0.0, "stiffness": 1e5, "friction": 0.6}
+    made = scene(section, pinned(0, 0, 0), pinned(45, 0, 20), "catenary", 60, G, seabed=bed)
     stuck, smooth = (hybrid.modes(made, 6, friction=x) for x in (True, False))
     rest = smooth.position["cable"][:, 2] < 0.0
     sideways = [max(np.abs(x.shifts["cable"][rest, 1]).max() for x in each.modes[:3]) for each in (stuck, smooth)]
@@ -337,9 +323,7 @@ def test_friction_holds_what_lies_on_the_bed():
 
 def test_periods_that_meet_and_what_turns_freely():
     motion = {"heave": {"amplitude": 0.1, "period": 1.27}, "ramp": 1.0}
-    section = {"length": 99.990048, "mass": 10.0, "axial_stiffness": 2e8}
-    made = scene(section, pinned(0, 0, 0), pinned(100, 0, 0, motion=motion), "catenary", 40, G)
-    (note,) = hybrid.modes(made, 3).notes
+    (note,) = hybrid.modes(sag(40, motion=motion), 3).notes
     assert note == "ends.end.motion.heave has a period of 1.27 s, near that of mode 2 (1.257 s)"
 
 

@@ -29,16 +29,9 @@ def hung(waves=None, motion=None, model="catenary", end=(6, 0, -5.15), cells=60,
         "torsional_stiffness": 1e3, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
     } | section  # fmt: skip
     fluid = {"density": 1025, "surface": 0} | ({"waves": waves} if waves else {})
-    held = {"kind": "pinned", "position": list(end)} | ({"motion": motion} if motion else {})
-    return {
-        "environment": {"fluid": fluid},
-        "cable": {"sections": [{k: x for k, x in line.items() if x is not None}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, -65]}, "end": held},
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": cells},
-        "time": {"duration": 10.0, "step": 0.1},
-    }
+    ends = pinned_at(0, 0, -65), pinned_at(*end, **({"motion": motion} if motion else {}))
+    line = {k: x for k, x in line.items() if x is not None}
+    return cable_scene(line, *ends, fluid=fluid, model=model, mesh=cells, time=(10.0, 0.1))
 
 
 def test_linear_drag_of_a_normal_velocity():

@@ -14,7 +14,7 @@ from hybrid.linear.loaded_line import turning_doubts
 from hybrid.linear.response_results import of_few, phases_of
 from hybrid.model.network import build_network
 from hybrid.scene.root import in_full
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, each_line, line_between, network_scene, pinned_at
 from tests.simulation.test_vortices import G, body, floating, scene, small_body
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
@@ -180,9 +180,9 @@ def test_what_is_left_out_of_the_drag_of_members():
     """
     member = {"start": [0, 0, -1], "end": [0, 0, 1], "diameter": 0.05, "drag": 200.0, "pieces": 2}
     waves = {"kind": "regular", "height": 1.0, "period": 8.0, "ramp": 10.0}
+    wire = {"length": 99.8, "mass": 0.01, "diameter": 0.003, "axial_stiffness": 1e8}
     made = scene({"surface": 0.0, "waves": waves}, body(members=[member], inertia=[900.0] * 3))
-    for line in made["lines"].values():
-        line["sections"] = [{"length": 99.8, "mass": 0.01, "diameter": 0.003, "axial_stiffness": 1e8}]
+    made = each_line(made, sections=[wire])
     part = math.sqrt(3.0 / 8.0) / (8.0 / (3.0 * math.pi) / math.sqrt(2.0)) - 1.0
     for line in hybrid.response(made).lines.values():
         assert line.left_out["tension"] == pytest.approx(part, rel=0.02)
@@ -252,12 +252,8 @@ def test_tension_of_a_line_with_a_heavy_float_near_its_resonance():
     rope = {"length": 183.0, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "added_mass": {"normal": 1.0}}
     held = {"kind": "float", "at": 91.5, "buoyancy": 1.2e5, "mass": 1.2e4, "drag_area": 5.8, "added_mass": 2.17e4}
     sea = sunken(0.4, 0.0)["environment"]
-    places = {"start": [-60, 0, -90], "end": [60, 0, -90]}
-    tables = {
-        "environment": sea, "cable": {"sections": [rope], "attachments": [held]}, "model": "catenary",
-        "ends": {k: {"kind": "pinned", "position": x} for k, x in places.items()},
-        "initial": "equilibrium", "mesh": {"cells": 16},
-    }  # fmt: skip
+    ends = pinned_at(-60, 0, -90), pinned_at(60, 0, -90)
+    tables = cable_scene(rope, *ends, attachments=[held], environment=sea, model="catenary", mesh=16)
     found = hybrid.response(tables)
     line, time = found.lines["cable"], {"duration": 1800.0, "step": 0.1}
     with hybrid.run(tables | {"time": time, "output": {"every": 0.5, "points": 17}}) as run:

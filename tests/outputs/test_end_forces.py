@@ -175,14 +175,11 @@ def test_a_stiff_rod_that_rises_from_its_anchor_without_tension_does_not_lie_bes
         rope | {"length": 24.3, "diameter": 0.202, "mass": 25.8},
         rope | {"length": 31.6},
     ]
-    places = {"start": [102.4, 41, -68.30569792314034], "end": [116.09, 15.24, -34.99]}
-    tables = {
-        "environment": {"fluid": {"density": RHO}, "seabed": {"z": places["start"][2], "stiffness": 3726}},
-        "cable": {"sections": sections},
-        "ends": {name: {"kind": "pinned", "position": place} for name, place in places.items()},
-        "initial": "equilibrium",
-        "model": "rod",
-    }
+    z = -68.30569792314034
+    tables = cable_scene(
+        sections, pinned_at(102.4, 41, z), pinned_at(116.09, 15.24, -34.99), model="rod",
+        fluid={"density": RHO}, seabed={"z": z, "stiffness": 3726},
+    )  # fmt: skip
     coarse, fine = (hybrid.static(tables | {"mesh": {"cells": n}}).reaction_start[0, 2] for n in (53, 212))
     assert coarse == pytest.approx(fine, rel=0.01)
 
@@ -210,20 +207,11 @@ def test_added_mass_acts_as_given_at_the_draught_of_a_body(shape: str) -> None:
     stiffness = RHO * G * volume * slope / height
     body = {"kind": "body", "mass": mass, "volume": volume, "height": height, "shape": shape, "added_mass": added}
     up = (0.5 - x) * height
-    found = hybrid.run(
-        hybrid.validate_scene(
-            {
-                "environment": {"fluid": {"density": RHO, "surface": 0}},
-                "cable": {"sections": [{"length": 1, "mass": 0.01, "diameter": 1e-3, "axial_stiffness": 1e4}]},
-                "ends": {"start": body, "end": "free"},
-                "initial": {"kind": "straight", "origin": [0, 0, up + 0.01], "direction": [0, 0, -1]},
-                "model": "catenary",
-                "mesh": {"cells": 2},
-                "time": {"duration": 6, "step": 0.005, "rho_inf": 1},
-                "output": {"every": 0.01},
-            }
-        )
-    )
+    found = hybrid.run(cable_scene(
+        {"length": 1, "mass": 0.01, "diameter": 1e-3, "axial_stiffness": 1e4}, body, "free",
+        initial={"kind": "straight", "origin": [0, 0, up + 0.01], "direction": [0, 0, -1]},
+        fluid={"density": RHO, "surface": 0}, model="catenary", mesh=2, time=(6, 0.005, 1), output=0.01,
+    ))  # fmt: skip
     z = found.position[:, 0, 2] - up
     turns = np.flatnonzero(np.diff(np.sign(z)))
     times = found.times[turns] - z[turns] * np.diff(found.times)[turns] / np.diff(z)[turns]

@@ -153,27 +153,20 @@ STEEL_AREA, BORE = math.pi / 4 * (OUTER**2 - INNER**2), math.pi / 4 * INNER**2
 CONTENT, PRESSURE = 800.0, 2e7
 
 
-def hanging_pipe() -> hybrid.Result:
-    """A closed pipe of steel, full of oil, that hangs from z = -20 m into the sea."""
+def hanging_pipe(length: float, *bare: float) -> hybrid.Result:
+    """A closed pipe of steel, full of oil, that hangs from z = -20 m into the sea; below it lengths that are no pipe."""
     mass = 7850.0 * STEEL_AREA + CONTENT * BORE
     pipe = {"wall": WALL, "pressure": PRESSURE, "pressure_z": 5.0, "content_density": CONTENT, "max_stress": 2e8}
     section = {"mass": mass, "diameter": OUTER, "axial_stiffness": 1e12, "pipe": pipe}
     return hybrid.static(cable_scene(
-        [{**section, "length": 300}, {**section, "length": 200, "pipe": None}], pinned_at(0, 0, -20), "free",
+        [section | {"length": length}, *(section | {"length": x, "pipe": None} for x in bare)], pinned_at(0, 0, -20), "free",
         fluid={"density": 1025, "surface": 0}, model="catenary", mesh=100, output={"points": 51}
     ))  # fmt: skip
 
 
 def test_wall_tension_balances_a_pipe_cut_open() -> None:
     """Weight of the wall below, less the pressure outside and more the pressure inside on the cap that closes it."""
-    section = {
-        "length": 500, "mass": 7850.0 * STEEL_AREA + CONTENT * BORE, "diameter": OUTER, "axial_stiffness": 1e12,
-        "pipe": {"wall": WALL, "pressure": PRESSURE, "pressure_z": 5.0, "content_density": CONTENT},
-    }  # fmt: skip
-    result = hybrid.static(cable_scene(
-        section, pinned_at(0, 0, -20), "free", fluid={"density": 1025, "surface": 0}, model="catenary", mesh=100,
-        output={"points": 51}
-    ))  # fmt: skip
+    result = hanging_pipe(500)
     s, bottom = result.s, -520.0
     inside, outside = PRESSURE + CONTENT * 9.81 * (5.0 - bottom), -1025.0 * 9.81 * bottom
     cap = inside * BORE - outside * math.pi / 4 * OUTER**2
@@ -182,7 +175,7 @@ def test_wall_tension_balances_a_pipe_cut_open() -> None:
 
 
 def test_a_section_without_pipe_has_no_stress_and_the_limit_is_judged() -> None:
-    result = hanging_pipe()
+    result = hanging_pipe(300, 200)
     assert np.isnan(result.von_mises[0, result.s > 300.0]).all() and np.isfinite(result.von_mises[0, :31]).all()
     at = int(np.flatnonzero(result["right/s"] == 300.0)[0])
     assert np.isnan(result["right/von_mises"][0, at])

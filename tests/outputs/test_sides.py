@@ -280,18 +280,11 @@ def test_curvature_is_interpolated_through_an_inflection(dimension: int) -> None
 def test_extremes_have_the_curvature_of_the_moment_and_of_the_unloaded_line_as_vectors() -> None:
     """0.3/m without load, and across them 0.4/m of a given moment make 0.5/m, behind the seam 0.2/m 0.36/m."""
     section = {"mass": 0.1, "axial_stiffness": 1e6, "torsional_stiffness": 1e3, "intrinsic_curvature": [0.3, 0.0, 0.0]}
-    found = hybrid.run(
-        {
-            "environment": {"gravity": 0.0},
-            "cable": {"sections": [section | {"length": 0.1, "bending_stiffness": EI} for EI in (100.0, 200.0)]},
-            "ends": {
-                "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]},
-                "end": {"kind": "free", "moment": [0.0, 0.0, 40.0]},
-            },
-            "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}, "time": {"duration": 0.02, "step": 0.01},
-            "output": {"every": 0.01, "points": 3},
-        }
-    )  # fmt: skip
+    found = hybrid.run(cable_scene(
+        [section | {"length": 0.1, "bending_stiffness": EI} for EI in (100.0, 200.0)],
+        clamped_at([0, 0, 0], [1, 0, 0], normal=[0, 1, 0]), {"kind": "free", "moment": [0.0, 0.0, 40.0]},
+        gravity=0.0, model="rod", mesh=20, time=(0.02, 0.01), output=(0.01, 3),
+    ))  # fmt: skip
     high, shown = np.asarray(found["envelope"]["curvature_max"]), found.curvature[0]
     assert high == pytest.approx(np.repeat([0.5, np.hypot(0.3, 0.2)], 11), rel=2e-4)
     assert high[[0, 10, -1]] == pytest.approx(shown, rel=1e-12)

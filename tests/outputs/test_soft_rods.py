@@ -14,7 +14,9 @@ from hybrid.model.material import Material
 from hybrid.scene.read import one_line, validate_scene
 from tests.combinations.pairs import BASE, END, FEATURES, SECTION
 from tests.problems import tables_with
+from tests.said import of_kind
 from tests.scenes import cable_scene, pinned_at
+from tests.simulation.bits import resumed
 
 MOVES = {"kind": "adaptive", "always_move": True}
 LINES: dict[str, dict[str, Any]] = {
@@ -113,16 +115,12 @@ def limited(radius: float, **section: Any) -> dict[str, Any]:
     return scene
 
 
-def kinks(result: hybrid.Result) -> list[Any]:
-    return [event for event in result.events if event.kind == "kink at joint"]
-
-
 @pytest.mark.parametrize("name", LEFT)
 def test_where_kinks_count_as_bends_an_event_says_so(name: str) -> None:
     """Once, of all the line; no verdict on bends, beyond the limit or within it."""
     for radius in (8.0, 0.1):
         found = hybrid.run(limited(radius, **LEFT[name]))
-        (said,) = kinks(found)
+        (said,) = of_kind(found, "kink at joint")
         first = next(event for event in found.events if event.kind == "grow")
         assert said.t == first.t > 0.0 and (said.s_a, said.s_b) == (0.0, 60.0)
         assert name in said.text and "model: rod" in said.text
@@ -140,20 +138,16 @@ def test_what_no_kink_can_have_broken_is_broken() -> None:
     early["ends"]["end"] |= {"kind": "clamped", "tangent": [0.2, 0, 1]}
     found = hybrid.run(early)
     (limit,) = found.verdicts().limits
-    assert limit.verdict == "broken" and limit.t < kinks(found)[0].t
+    assert limit.verdict == "broken" and limit.t < of_kind(found, "kink at joint")[0].t
     found = hybrid.run(limited(12.0))
-    assert any(event.kind == "grow" for event in found.events) and not kinks(found)
+    assert any(event.kind == "grow" for event in found.events) and not of_kind(found, "kink at joint")
     (limit,) = found.verdicts().limits
     assert limit.verdict == "broken" and limit.value > 10.0
 
 
 def test_a_run_that_is_resumed_says_it_once(tmp_path: Path) -> None:
-    scene = limited(8.0, **LEFT["tables of moment"])
-    whole = hybrid.run(scene)
-    hybrid.run(scene | {"time": scene["time"] | {"duration": 3.5}}, output=tmp_path / "part.h5")
-    resumed = hybrid.resume(tmp_path / "part.h5", until=4.0)
-    assert [(x.t, x.kind, x.text) for x in resumed.events] == [(x.t, x.kind, x.text) for x in whole.events]
-    assert len(kinks(resumed)) == 1 and sum(x.kind == "grow" and x.t > 3.5 for x in resumed.events) > 0
+    whole = resumed(limited(8.0, **LEFT["tables of moment"]), tmp_path, 3.5)
+    assert len(of_kind(whole, "kink at joint")) == 1 and sum(x.kind == "grow" and x.t > 3.5 for x in whole.events) > 0
 
 
 MOMENT = {END: {"kind": "free", "force": [40, 3, 30], "moment": [0, 1, 0]}}

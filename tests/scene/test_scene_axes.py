@@ -87,21 +87,10 @@ def test_a_cable_with_a_table_is_a_rod_by_default() -> None:
 
 
 @pytest.mark.parametrize(
-    ("end", "more", "where"),
-    [
-        (
-            "{kind: pinned, position: [8, 0, 0], payout: {rate: 0.1, ramp: 5, reel: [{length: 5, mass: 1}]}}",
-            "model: catenary",
-            "ends.end.payout.reel[0]",
-        ),
-    ],
+    ("section", "reel", "where"), [(TABLE, "", ""), ("axial_stiffness: 1.0e+5", f", {TABLE}", ".tension_strain")]
 )
-def test_what_cannot_be_computed_with_a_table_is_refused(end: str, more: str, where: str) -> None:
-    assert where in [x.where for x in complaints(f"{SCENE % (TABLE, end)}{more}\n")]
-
-
-def test_a_table_on_the_reel_is_refused() -> None:
-    reel = f"[{{length: 5, mass: 1, {TABLE}}}]"
+def test_a_table_at_a_winch_or_on_its_reel_alone_is_refused(section: str, reel: str, where: str) -> None:
+    reel = f"[{{length: 5, mass: 1{reel}}}]"
     end = f"{{kind: pinned, position: [8, 0, 0], payout: {{rate: 0.1, ramp: 5, reel: {reel}}}}}"
-    found = complaints(f"{SCENE % ('axial_stiffness: 1.0e+5', end)}model: catenary\n")
-    assert "ends.end.payout.reel[0].tension_strain" in [x.where for x in found]
+    found = complaints(f"{SCENE % (section, end)}model: catenary\n")
+    assert f"ends.end.payout.reel[0]{where}" in [x.where for x in found]

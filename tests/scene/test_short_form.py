@@ -116,30 +116,24 @@ def test_places_and_messages_of_a_network_are_said_in_words_of_the_scene() -> No
     assert found.at == ("ends", "end", "initial_guess") and found.expected == "a place near initial"
 
 
-def test_a_moment_at_the_end_of_a_line_is_for_a_rod_without_a_body() -> None:
-    tables = in_full(scene("body")).model_dump(mode="json", exclude_none=True)
-    with pytest.raises(SceneError, match="nothing there takes a moment"):
-        as_scene(tables_with(tables, {"points.end.moment": MOMENT}))
+def tables_in_full(*features: str) -> dict[str, Any]:
+    return in_full(scene(*features)).model_dump(mode="json", exclude_none=True)
 
 
-@pytest.mark.parametrize("wrong", [
-    ({"points.end": {"kind": "guided"}}, "the direction in which point end holds the line"),
-    ({"points.end": {"kind": "guided", "motion": {"heave": {"amplitude": 1, "period": 3}}}}, "rotation only"),
-    ({"points.end": {"kind": "guided"}, "lines.cable.connections.end": {"tangent": [1, 0, 0], "swivel": True}},
+SECOND = tables_in_full("free end")["lines"]["cable"] | {"start": "end", "end": "far"}
+
+
+@pytest.mark.parametrize(("features", "wrong", "says"), [
+    (["body"], {"points.end.moment": MOMENT}, "nothing there takes a moment"),
+    ([], {"points.end": {"kind": "guided"}}, "the direction in which point end holds the line"),
+    ([], {"points.end": {"kind": "guided", "motion": {"heave": {"amplitude": 1, "period": 3}}}}, "rotation only"),
+    ([], {"points.end": {"kind": "guided"}, "lines.cable.connections.end": {"tangent": [1, 0, 0], "swivel": True}},
      "lets it spin|lets the line spin"),
+    (["free end"], {"lines.second": SECOND, "points.far": {"position": [20.0, 0.0, 0.0]}}, "the lines that meet here"),
 ])  # fmt: skip
-def test_a_guided_point_that_is_none_is_refused(wrong: tuple[dict[str, Any], str]) -> None:
-    tables = in_full(scene()).model_dump(mode="json", exclude_none=True)
-    with pytest.raises(SceneError, match=wrong[1]):
-        as_scene(tables_with(tables, wrong[0]))
-
-
-def test_a_free_point_where_lines_meet_says_where_it_is_first() -> None:
-    tables = in_full(scene("free end")).model_dump(mode="json", exclude_none=True)
-    second = tables["lines"]["cable"] | {"start": "end", "end": "far"}
-    more = {"lines.second": second, "points.far": {"position": [20.0, 0.0, 0.0]}}
-    with pytest.raises(SceneError, match="the lines that meet here"):
-        as_scene(tables_with(tables, more))
+def test_what_a_point_cannot_be_is_refused(features: list[str], wrong: dict[str, Any], says: str) -> None:
+    with pytest.raises(SceneError, match=says):
+        as_scene(tables_with(tables_in_full(*features), wrong))
 
 
 def test_tables_of_both_forms_change_together() -> None:

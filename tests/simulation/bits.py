@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+import pytest
 
 import hybrid
 import hybrid.accuracy.refinement
@@ -78,6 +80,12 @@ class Stopping:
         self.heard += 1
         if self.left == 0:
             raise KeyboardInterrupt
+
+    def stop(self, after: int, go: Callable[..., Any], *given: Any, **more: Any) -> None:
+        """Stop what runs after so many steps."""
+        self.left = after
+        with pytest.raises(KeyboardInterrupt):
+            go(*given, progress=self, **more)
 
 
 def went_on(scene: hybrid.Scene, path: Path, stopping: Stopping, stops: list[int], **more) -> int:

@@ -7,6 +7,8 @@ from contextlib import AbstractContextManager, nullcontext
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.error_order import Errors
 from hybrid.accuracy.line_errors import LineErrors
@@ -58,3 +60,17 @@ class OneLine:
     def notes(self) -> tuple[tuple[str, str], ...]:
         """Events of the line, and of its results."""
         return (*self.line.notes, *self.control.notes)
+
+
+def made_up(
+    fineness: float = 1.0, steps: int = 100, off: float = 0.0, step: float | None = None,
+    notes: Sequence[tuple[str, str]] = (), model: float = 0.0,
+) -> RunSample:  # fmt: skip
+    """A run whose position is off by 0.01 m/fineness^2, and by `off` at one point and output; what it says of itself."""
+    position = np.full((9, 4, 3), 0.01 / fineness**2)
+    position[5, 2] += off
+    resolution = Resolution(fineness, step or 10.0 / steps, 1e-6, 1e-3)
+    model_error = {"position": np.full((9, 4), model)} if model else {}
+    return RunSample(
+        resolution, {"position": position}, round(100 * fineness), steps, 0.0, 1, False, model_error, tuple(notes)
+    )

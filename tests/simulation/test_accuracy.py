@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from controlled import OneLine
+from controlled import OneLine, made_up
 from scipy.interpolate import CubicSpline
 
 import hybrid
@@ -608,15 +608,11 @@ def test_a_reader_does_not_lose_the_figure(tmp_path):
 @pytest.mark.long
 def test_what_steps_damp_out_is_said():
     """A stiff rod let go swings as a pendulum; its bending vibrations are far below what a step may be wrong by."""
-    data = {
-        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "bending_stiffness": 20.0}]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
-        "initial": {"kind": "straight", "direction": [np.sin(0.2), 0, -np.cos(0.2)]},
-        "model": "rod",
-        "time": {"duration": 3.2},
-        "output": {"every": 0.1, "points": 11},
-        "accuracy": "1 cm",
-    }
+    data = cable_scene(
+        {"length": 1.0, "mass": 1.0, "bending_stiffness": 20.0}, pinned_at(0, 0, 0), {"kind": "free"}, model="rod",
+        initial={"kind": "straight", "direction": [np.sin(0.2), 0, -np.cos(0.2)]},
+        time=3.2, output=(0.1, 11), accuracy="1 cm",
+    )  # fmt: skip
     assert "vibrations damped" in {e.kind for e in hybrid.run(data).events}
     assert "vibrations damped" not in {e.kind for e in hybrid.run(swinging()).events}
 
@@ -650,30 +646,12 @@ def test_an_equilibrium_does_not_replace_a_file_unasked(tmp_path):
     hybrid.static(scene, target)
 
 
-def made_up(notes=(), model=(), fineness=1.0, steps=100):
-    """A run that says something of itself, whose position is off by 1/fineness."""
-    position = np.full((9, 4, 3), 0.01 / fineness**2)
-    model_error = {"position": np.full((9, 4), model)} if model else {}
-    resolution = Resolution(fineness, 0.1, 1e-6, 1e-3)
-    return RunSample(
-        resolution,
-        {"position": position},
-        round(100 * fineness),
-        steps,
-        0.0,
-        1,
-        False,
-        model_error,
-        tuple(notes),
-    )
-
-
 def test_notes_and_model_error_are_of_the_runs_that_count(monkeypatch):
     """What a result said that was replaced by a finer one, or a model error of zones before, is not told."""
-    said = iter([made_up([("vibrations damped", "first")]), made_up(fineness=9.0, steps=900)])
-    before = made_up([("model error not estimated", "before")], 0.004, 0.5, 50)
-    comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25)])
-    models = iter([before, made_up((), 0.0005, 9.0, 900)])
+    said = iter([made_up(notes=[("vibrations damped", "first")]), made_up(9.0, 900, step=0.1)])
+    before = made_up(0.5, 50, step=0.1, notes=[("model error not estimated", "before")], model=0.004)
+    comparisons = iter([before, made_up(0.5, 25, step=0.1), made_up(0.25, 25, step=0.1)])
+    models = iter([before, made_up(9.0, 900, step=0.1, model=0.0005)])
 
     def as_rods(case, runs, costs):
         costs.append(0.0)

@@ -19,15 +19,13 @@ from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.scene.read import as_scene
 from hybrid.simulation import first_use
 from hybrid.simulation.progress import Progress
+from tests.inside import calls_of
+from tests.scenes import cable_scene, pinned_at
 
-WIRE: dict[str, Any] = {
-    "cable": {"sections": [{"length": 2.0, "mass": 1.0}]},
-    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, -20]}},
-    "initial": "equilibrium",
-    "model": "catenary",
-    "mesh": {"cells": 4},
-    "time": {"duration": 0.1, "step": 0.05},
-}
+WIRE = cable_scene(
+    {"length": 2.0, "mass": 1.0}, pinned_at(0, 0, 0), {"kind": "free", "force": [0, 0, -20]}, model="catenary", mesh=4,
+    time=(0.1, 0.05)
+)  # fmt: skip
 # Let go and pushed upwards: it goes into compression.
 PUSHED = WIRE | {
     "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, 400.0]}},
@@ -221,11 +219,10 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
         if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
     }
     assert used - others <= {x.__qualname__ for x in first_use.payout_kernels()}
-    ends = {"start": {"kind": "free"}, "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 60}}}
-    scene = hybrid.validate_scene({
-        "cable": {"sections": [{"length": 40.0, "mass": 2.0}]}, "ends": ends, "initial": "equilibrium",
-        "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 10, "step": 0.05},
-    })  # fmt: skip
+    scene = hybrid.validate_scene(cable_scene(
+        {"length": 40.0, "mass": 2.0}, {"kind": "free"}, pinned_at(0, 0, 0, payout={"longest": 60}), model="catenary",
+        mesh=20, time=(10, 0.05)
+    ))  # fmt: skip
     paid = first_use.PAYOUT_OF_LINES[0]
     assert paid in first_use.kernels_of(scene)
     assert paid not in first_use.kernels_of(scene, static=True)
@@ -238,11 +235,8 @@ TIME = {"time": {"duration": 0.1, "step": 0.05}}
 
 
 def one(section: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:
-    ends = {name: {"kind": "pinned", "position": POINTS[at]["position"]} for name, at in (("start", "a"), ("end", "b"))}
-    return {
-        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": model, "mesh": {"cells": 12},
-        "contact": {"self": False},
-    } | TIME | more  # fmt: skip
+    ends = (pinned_at(*POINTS[at]["position"]) for at in "ab")
+    return cable_scene(section, *ends, model=model, mesh=12, contact={"self": False}) | TIME | more
 
 
 def named(section: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:
@@ -286,9 +280,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the kernels that take long to compile: else a machine would be said to be ready while they compile."""
-    called: set[str] = set()
-    taking = KeptCode.taking
-    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
+    called = calls_of(monkeypatch, KeptCode, "taking", lambda code, _: code._name)
     scene = as_scene(KINDS[kind])
     known = first_use.kernels_of(scene, static)
     hybrid.static(scene) if static else hybrid.run(scene)
@@ -299,7 +291,7 @@ def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeyp
     stood_for = {before[name] for name in known if name in before}  # compiled before those, by the same calls
     if "zones" in kind:
         stood_for.add(first_use.STABILITY)  # zones may come out without a rod: nobody knows before
-    assert not (called & large) - set(known) - stood_for
+    assert not ({*called} & large) - set(known) - stood_for
 
 
 @pytest.mark.long
@@ -318,9 +310,7 @@ def test_a_line_that_is_joined_to_nothing_asks_for_no_solver_of_joined_ones(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nor one in a plane for that in space: together they take longer to compile than all else."""
-    called: set[str] = set()
-    taking = KeptCode.taking
-    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
+    called = calls_of(monkeypatch, KeptCode, "taking", lambda code, _: code._name)
     hybrid.run(KINDS[kind])
-    assert not called & {"run.newton.solve_network", "junctions.junctions.join_lines"}
+    assert not {*called} & {"run.newton.solve_network", "junctions.junctions.join_lines"}
     assert ("run.newton.in_space" in called) == kind.startswith("rod in space")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
-from typing import Any
 
 import pytest
 from bits import differences
@@ -16,6 +15,7 @@ from hybrid.simulation import case as cases
 from hybrid.simulation import progress as reports
 from hybrid.simulation.case import THREADS, Case, beside, thread_count
 from hybrid.simulation.progress import ESTIMATION, RESULT, Progress
+from tests.inside import calls_of
 
 TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 
@@ -35,19 +35,12 @@ def scene(*settings: str) -> hybrid.Scene:
 def test_any_number_of_threads_gives_the_same_bits(
     settings: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    used: set[str] = set()
-    sample = Case.sample
-
-    def noted(self: Case, *given: Any, **more: Any) -> Any:
-        used.add(threading.current_thread().name)
-        return sample(self, *given, **more)
-
-    monkeypatch.setattr(Case, "sample", noted)
+    used = calls_of(monkeypatch, Case, "sample", lambda *_: threading.current_thread().name)
     for count in ("1", "2", "3"):
         monkeypatch.setenv(THREADS, count)
         used.clear()
         hybrid.run(scene(*settings), tmp_path / f"{count}.h5").close()
-        assert (len(used) > 1) == (count != "1")
+        assert (len({*used}) > 1) == (count != "1")
     assert differences(tmp_path / "1.h5", tmp_path / "2.h5") == []
     assert differences(tmp_path / "1.h5", tmp_path / "3.h5") == []
 

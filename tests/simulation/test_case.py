@@ -26,6 +26,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress, ProgressReporter, StatusLine
 from hybrid.simulation.run_sample import ALL, MOST_PLACES, RunSample, at_all_points, compared_places
 from hybrid.solve.network_steps import CELL_STEPS, NetworkSteps
+from tests.inside import calls_of
 from tests.scenes import cable_scene, pinned_at
 
 SCENE: dict[str, Any] = cable_scene(
@@ -306,15 +307,7 @@ def test_between_places_the_larger_error_counts() -> None:
 
 def test_errors_are_at_all_output_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As those of runs that are compared at all of them, but for what lies between places."""
-    compared: list[int] = []
-    sample = Case.sample
-
-    def counting(self: Case, *arguments: Any, **more: Any) -> Any:
-        found = sample(self, *arguments, **more)
-        compared.append(np.shape(found[LINE].values["position"])[1])
-        return found
-
-    monkeypatch.setattr(Case, "sample", counting)
+    compared = calls_of(monkeypatch, Case, "sample", after=lambda x, *_: np.shape(x[LINE].values["position"])[1])
     scene = described(True) | {"output": {"every": 0.1, "points": POINTS, "errors": True}}
     with hybrid.run(scene, tmp_path / "some.h5") as some:
         places = compared_places(OutputPoints(np.asarray(some["s"]), np.zeros(0)))

@@ -553,18 +553,11 @@ def taut(duration, periods, **more):
     wave = np.sqrt(1.0e5 * stretch / (0.5 * (1.0 + stretch)))
     period = 2.0 * length * (1.0 + stretch) / wave * periods
     heave = {"heave": {"amplitude": 0.5, "period": period}, "ramp": period}
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": length, "mass": 0.5, "axial_stiffness": 1.0e5, "max_strain": 0.2}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [length * (1.0 + stretch), 0, 0], "motion": heave},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "time": {"duration": duration},
-        "output": {"every": 0.25, "points": 11},
-    } | more
+    end = pinned_at(length * (1.0 + stretch), 0, 0, motion=heave)
+    return cable_scene(
+        {"length": length, "mass": 0.5, "axial_stiffness": 1.0e5, "max_strain": 0.2}, pinned_at(0, 0, 0), end,
+        gravity=0, model="catenary", time=duration, output=(0.25, 11),
+    ) | more  # fmt: skip
 
 
 @pytest.mark.long

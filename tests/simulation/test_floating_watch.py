@@ -13,10 +13,10 @@ from bits import resumed
 from numpy.typing import NDArray
 
 import hybrid
-from hybrid import Result
 from hybrid.model.build import build
 from hybrid.scene.read import one_line
 from hybrid.simulation.watches import Knot, Loops, crossings_of_knot, note_hockling, note_knot, note_loops
+from tests.said import of_kind, texts_of
 from tests.scenes import cable_scene, network_scene, pinned_at
 
 HEIGHT = 2.0  # m
@@ -35,13 +35,9 @@ def two_chains(volume: float, **more: Any) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def pulled(result: Result) -> list[str]:
-    return [x.text for x in result.events if x.kind == "pulled under"]
-
-
 def test_the_volume_that_is_named_floats_the_lines_and_a_smaller_one_does_not() -> None:
     few = hybrid.static(two_chains(3.5))
-    (text,) = pulled(few)
+    (text,) = texts_of(few, "pulled under")
     depth = -few["points/buoy/position"][0, 2] - 0.5 * HEIGHT
     assert f"its top is {depth:.3g} m below the surface" in text and depth > 1.0
     net = 9.81 * (1025 * 3.5 - 2500)
@@ -49,15 +45,15 @@ def test_the_volume_that_is_named_floats_the_lines_and_a_smaller_one_does_not() 
     volume = float(re.search(r"a volume of (\S+) m\^3 would float them", text)[1])  # type: ignore[index]
     assert volume > 3.5
     floats = hybrid.static(two_chains(1.02 * volume))
-    assert not pulled(floats) and -0.5 * HEIGHT < floats["points/buoy/position"][0, 2] < 0.0
-    assert pulled(hybrid.static(two_chains(0.98 * volume)))
+    assert not texts_of(floats, "pulled under") and -0.5 * HEIGHT < floats["points/buoy/position"][0, 2] < 0.0
+    assert texts_of(hybrid.static(two_chains(0.98 * volume)), "pulled under")
 
 
 def test_what_is_to_stay_in_the_depth_is_not_told() -> None:
     """Without height, and first put below the surface, as a buoy of a mooring that is submerged."""
     scene = two_chains(3.5, initial_guess=[0, 0, -15], height=None)
     del scene["points"]["buoy"]["height"]
-    assert not pulled(hybrid.static(scene))
+    assert not texts_of(hybrid.static(scene), "pulled under")
 
 
 @pytest.mark.long  # 1.0 s
@@ -66,14 +62,14 @@ def test_a_buoy_is_told_once_in_waves_that_pass_over_it_and_again_where_it_is_mu
     scene = two_chains(4.0)
     scene["environment"]["fluid"]["waves"] = {"kind": "regular", "height": 2.0, "period": 8.0}
     whole = hybrid.run(scene)
-    told = pulled(whole)
+    told = texts_of(whole, "pulled under")
     assert told and "and its lines pull it down by" in told[0]
     tops = [float(re.search(r"top is (\S+) m", x)[1]) for x in told]  # type: ignore[index]
     assert all(b > 3.0 * a for a, b in pairwise(tops))
     file = tmp_path / "half.h5"
     scene["time"]["duration"] = 1.0
     hybrid.run(scene, file)
-    assert pulled(hybrid.resume(file, until=2.0)) == told
+    assert texts_of(hybrid.resume(file, until=2.0), "pulled under") == told
 
 
 # --- torques that can throw a loop ---
@@ -102,10 +98,6 @@ def twisted(turns: float, over: float = 0.0, model: Any = "rod", away: float = 0
     )
 
 
-def told(result: hybrid.Result) -> list[Any]:
-    return [event for event in result.events if event.kind == "loop can form"]
-
-
 def margins(result: hybrid.Result) -> np.ndarray:
     """(nt, ns) formation margins."""
     return np.asarray(4.0 * EI * np.maximum(result["tension"], 1e-9) / result["torque"] ** 2)
@@ -113,8 +105,8 @@ def margins(result: hybrid.Result) -> np.ndarray:
 
 def test_an_equilibrium_with_too_much_torque() -> None:
     few, many = hybrid.static(twisted(3.0, model=CATENARY)), hybrid.static(twisted(12.0, model=CATENARY))
-    assert margins(few).min() > 1.0 and not told(few)
-    (event,) = told(many)
+    assert margins(few).min() > 1.0 and not of_kind(few, "loop can form")
+    (event,) = of_kind(many, "loop can form")
     assert event.value == pytest.approx(margins(many).min(), rel=1e-9) and event.value < 1.0
     assert event.s_a == pytest.approx(many.s[margins(many)[0].argmin()])
     assert event.threshold == 1.0
@@ -128,14 +120,14 @@ def test_a_run_that_slackens(model: Any, over: float) -> None:
     result = hybrid.run(twisted(5.0, over, model))
     least = margins(result).min(axis=1)
     assert least[0] > 1.0 > least.min()
-    events = told(result)
+    events = of_kind(result, "loop can form")
     first = int(np.argmax(least < 1.0))
     at = int(np.argmin(np.abs(result.times - events[0].t)))
     assert 0 <= at - first <= 2  # the stretch must be long enough
     assert events[0].value == pytest.approx(least[at], rel=1e-6)
     assert all(b.value <= a.value / 3.0 for a, b in pairwise(events))
     assert len(events) < 12
-    assert not told(hybrid.run(twisted(0.5, over, model)))
+    assert not of_kind(hybrid.run(twisted(0.5, over, model)), "loop can form")
 
 
 def test_a_loop_that_forms() -> None:
@@ -167,7 +159,7 @@ def test_a_loop_that_forms_slowly_is_foreseen(model: Any, time: dict[str, float]
     data = tables.model_dump(mode="python", exclude_unset=True) | {"model": model, "time": time}
     result = hybrid.run(data)
     (formed, *_) = [event for event in result.events if event.kind == "loop formed"]
-    first, least = told(result)[0], margins(result).min(axis=1)
+    first, least = of_kind(result, "loop can form")[0], margins(result).min(axis=1)
     assert 0.9 < first.value < 1.0 and first.t < formed.t - 1.5
     assert first.t <= result.times[int(np.argmax(least < 1.0))] + 0.45  # the stretch must be long enough
 
@@ -253,10 +245,6 @@ def hanging(end: list[float], diameter: float | None = 0.02, **more: Any) -> dic
     )
 
 
-def meetings(result: hybrid.Result) -> list[Any]:
-    return [event for event in result.events if event.kind == "line meets itself"]
-
-
 def test_an_end_that_is_led_through_the_line(tmp_path: Path) -> None:
     """A run that is stopped after it has been said goes on with the least clearance, and does not say it again."""
     scene = hanging(
@@ -265,7 +253,7 @@ def test_an_end_that_is_led_through_the_line(tmp_path: Path) -> None:
     )  # fmt: skip
     scene["ends"]["end"]["motion"] = {"travel": {"by": [-1.2, 0, 0], "over": 4.0}}
     result = resumed(scene, tmp_path, 3.0)
-    first = meetings(result)[0]
+    first = of_kind(result, "line meets itself")[0]
     assert first.s_a < 1.4 and first.s_b > 3.9  # the end, and the leg of the start, which hangs 1 m deep there
     assert first.value < first.threshold == pytest.approx(0.02)
     near = np.linalg.norm(result["position"][:, 20:31] - result["position"][:, -1:], axis=2).min(axis=1)
@@ -277,19 +265,19 @@ def test_an_end_that_is_led_through_the_line(tmp_path: Path) -> None:
 
 def test_a_line_that_hangs_is_not_told_of() -> None:
     result = hybrid.run(hanging([3.0, 0, 0], time={"duration": 0.2, "step": 0.1}))
-    assert not meetings(result)
+    assert not of_kind(result, "line meets itself")
     assert all(np.isnan(result[key]) for key in KEYS)
 
 
 def test_legs_of_an_equilibrium_that_are_in_each_other() -> None:
-    assert not meetings(hybrid.static(hanging([0.1, 0, -0.5], diameter=0.02)))
-    found = meetings(hybrid.static(hanging([0.1, 0, -0.5], diameter=0.09)))
+    assert not of_kind(hybrid.static(hanging([0.1, 0, -0.5], diameter=0.02)), "line meets itself")
+    found = of_kind(hybrid.static(hanging([0.1, 0, -0.5], diameter=0.09)), "line meets itself")
     assert len(found) == 1 and found[0].value < 0.09
 
 
 def test_without_a_diameter_there_is_nothing_to_look_for() -> None:
     result = hybrid.static(hanging([0.1, 0, -0.5], diameter=None))
-    assert not meetings(result) and not any(key in result for key in KEYS)
+    assert not of_kind(result, "line meets itself") and not any(key in result for key in KEYS)
 
 
 # --- knots, and lines that leave a sheave ---
@@ -389,10 +377,6 @@ def over_a_sheave(**more: Any) -> dict[str, Any]:
     ) | more  # fmt: skip
 
 
-def departures(result: Any) -> list[Any]:
-    return [e for e in result.events if e.kind == "line leaves the sheave"]
-
-
 @pytest.mark.long
 def test_a_line_leaves_a_sheave_and_comes_back() -> None:
     result = hybrid.run(over_a_sheave())
@@ -405,19 +389,19 @@ def test_a_line_leaves_a_sheave_and_comes_back() -> None:
         if on and gone:
             expected.append(t)
         on = lying or (on and not gone)
-    found = departures(result)
+    found = of_kind(result, "line leaves the sheave")
     assert len(expected) == 2
     assert [e.t for e in found] == pytest.approx(expected)
     assert all(abs(e.s_a - 2.01) < 0.2 and "leaves wheel" in e.text and "farther out" in e.text for e in found)
 
 
 def test_a_run_that_is_resumed_knows_where_the_line_lay(tmp_path: Any) -> None:
-    whole = departures(hybrid.run(over_a_sheave()))
+    whole = of_kind(hybrid.run(over_a_sheave()), "line leaves the sheave")
     simulation = hybrid.Simulation(over_a_sheave(), tmp_path / "run.h5")
     simulation.advance(whole[0].t - 0.12)
     kept = simulation.save()
     simulation.advance(whole[0].t + 0.2)
     simulation.restore(kept)
     simulation.advance(whole[0].t + 0.2)
-    found = departures(simulation.result())
+    found = of_kind(simulation.result(), "line leaves the sheave")
     assert [(e.t, e.s_a, e.text) for e in found] == [(whole[0].t, whole[0].s_a, whole[0].text)]

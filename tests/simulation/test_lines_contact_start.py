@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 
 import hybrid
 from hybrid.kernels.state.books import PARTS_ITSELF
 from hybrid.model.network import build_network
 from hybrid.simulation import run_record
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene, system_of
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, bridle, crossing, lowered
-from tests.validation.test_validation_obstacles_of_lines import system_of
 
 Tables = dict[str, Any]
 BEGINS, NOT_ASKED = "contact begins", {"between": []}
@@ -67,9 +67,7 @@ def test_what_presses_is_called_by_its_name(begun: Any) -> None:
 
 
 def test_taut_catenaries_touch_as_if_asked() -> None:
-    tables = unasked()
-    for line in tables["lines"].values():
-        line |= {"model": "catenary", "sections": [ROPE | {"length": 0.805}]}
+    tables = each_line(unasked(), model="catenary", sections=[ROPE | {"length": 0.805}])
     found = hybrid.run(tables)
     assert BEGINS in kinds(found) and PASSAGE not in kinds(found)
     assert same(found, hybrid.run(tables | {"contact": {}})) < 1e-9
@@ -137,9 +135,7 @@ def hung_apart(part: float = 1.0, **more: Any) -> Tables:
         tables["points"][name] = {"position": [*place, 0]}
     for name in "ab":
         tables["points"][name] = {"position": [*tables["points"][name]["position"][:2], 0.012], "motion": move}
-    for line in tables["lines"].values():
-        line["sections"] = [ROPE | {"length": 0.77 + 0.09 * part}]
-    return tables
+    return each_line(tables, sections=[ROPE | {"length": 0.77 + 0.09 * part}])
 
 
 @pytest.mark.parametrize("part", [1.0, 0.5])
@@ -228,38 +224,29 @@ def test_a_line_that_parts_from_itself_as_it_comes_near_another_one_stays_in_con
         assert same(begun, run.result()) < 1e-9
 
 
-def moving(tables: Tables) -> None:
-    for line in tables["lines"].values():
-        line["model"] = {"kind": "adaptive", "tolerance": 1e-3}
+def moving(tables: Tables) -> Tables:
+    return each_line(tables, model={"kind": "adaptive", "tolerance": 1e-3})
 
 
-def following(tables: Tables) -> None:
-    for line in tables["lines"].values():
-        line["model"] = {"kind": "adaptive", "curvature_error": 0.05}
-        del line["mesh"]
+def following(tables: Tables) -> Tables:
+    return each_line(tables, model={"kind": "adaptive", "curvature_error": 0.05}, mesh={})
 
 
-def paid(tables: Tables) -> None:
+def paid(tables: Tables) -> Tables:
     payout = {"rate": 0.01, "ramp": 0.2, "longest": 1.01}  # outputs lie by the longest of either run
     tables["lines"]["upper"]["connections"] = {"end": {"kind": "pinned", "payout": payout}}
+    return tables
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("change", [moving, following, paid])
-def test_contact_begins_in_lines_whose_cells_come_and_go(change: Callable[[Tables], None], tmp_path: Path) -> None:
-    tables = unasked()
-    change(tables)
-    found = hybrid.run(tables)
+def test_contact_begins_in_lines_whose_cells_come_and_go(change: Callable[[Tables], Tables], tmp_path: Path) -> None:
+    found = resumed(change(unasked()), tmp_path, 0.5)
     assert BEGINS in kinds(found) and PASSAGE not in kinds(found)
     assert found.lines["upper"]["self_contact"].max() > 1.0
     upper, lower = (found.lines[x].position for x in ("upper", "lower"))
     apart = np.linalg.norm(upper[:, :, None] - lower[:, None], axis=3).min(axis=(1, 2))
     assert apart.min() > 0.9 * ROPE["diameter"]
-    hybrid.run(tables | {"time": {"duration": 0.5, "step": 0.01}}, tmp_path / "half.h5")
-    resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
-    for name, line in found.lines.items():
-        for quantity in ("s", *NAMES):
-            assert np.array_equal(line[quantity], resumed.lines[name][quantity], equal_nan=True)
 
 
 @pytest.mark.long  # 1.1 s
@@ -290,8 +277,8 @@ def test_a_file_of_before_goes_on_without_contact(monkeypatch: pytest.MonkeyPatc
     with monkeypatch.context() as before:
         write_as_before(before)
         hybrid.run(unasked(0.2), tmp_path / "half.h5")
-    resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
-    assert BEGINS not in kinds(resumed) and PASSAGE in kinds(resumed)
+    found = hybrid.resume(tmp_path / "half.h5", until=0.8)
+    assert BEGINS not in kinds(found) and PASSAGE in kinds(found)
 
 
 def test_an_equilibrium_in_which_lines_have_crossed_says_so() -> None:

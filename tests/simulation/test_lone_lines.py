@@ -18,6 +18,7 @@ from hybrid.kernels.state.report import PLANAR
 from hybrid.scene.root import in_full
 from hybrid.solve.network_solver import NetworkSolver
 from tests.combinations.networks import differences, events_differ
+from tests.inside import calls_of
 from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 Tables = dict[str, Any]
@@ -194,15 +195,9 @@ def test_a_body_that_comes_to_touch_a_line_moves_with_it(
 @pytest.fixture
 def flat(monkeypatch: pytest.MonkeyPatch) -> list[list[int]]:
     """Numbers of the lines whose steps are made in a plane, of each solver of a motion."""
-    found: list[list[int]] = []
-    swap_states = NetworkSolver.swap_states
-
-    def noted(solver: NetworkSolver, states: Any) -> dict[str, Any]:
-        found.append([k for k in solver.lone if solver.lines[k].line.bits & PLANAR])
-        return swap_states(solver, states)
-
-    monkeypatch.setattr(NetworkSolver, "swap_states", noted)
-    return found
+    return calls_of(
+        monkeypatch, NetworkSolver, "swap_states", lambda x, _: [k for k in x.lone if x.lines[k].line.bits & PLANAR]
+    )
 
 
 def as_network(tables: Any) -> hybrid.Scene:

@@ -23,15 +23,14 @@ from hybrid.model.build import build
 from hybrid.model.network import NetworkResolution
 from hybrid.model.plan import CHOSEN, REST, Cost, cheapest
 from hybrid.model.resolution import first_resolution, model_is_free
-from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene, one_line
 from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample, restored_sample
 from hybrid.store.integrity import pack, unpack
 from hybrid.store.stored_rows import MissingRows
-from tests.said import line_of, said
-from tests.scenes import cable_scene, pinned_at
+from tests.said import line_of, said, texts_of
+from tests.scenes import cable_scene, pinned_at, system_of
 
 
 def span(EI: float, model: Any, **more: Any) -> hybrid.Scene:
@@ -458,15 +457,12 @@ HEAVE = {"position": [9, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period":
 TABLES = {"time": {"duration": 2.0, "step": 0.005}, "output": {"every": 0.1}}
 
 
+CHOSEN_SLACK = "slack line as rods"
+
+
 def cable(**more: Any) -> dict[str, Any]:
     """A line whose end falls faster than its weight lets it follow."""
-    start = {"kind": "pinned", "position": [0, 0, 0]}
-    ends = {"start": start, "end": HEAVE | {"kind": "pinned"}}
-    return (
-        {"cable": {"sections": [SECTION]}, "ends": ends, "initial": "equilibrium", "mesh": {"cells": 20}}
-        | TABLES
-        | more
-    )
+    return cable_scene(SECTION, pinned_at(0, 0, 0), HEAVE | {"kind": "pinned"}, mesh=20) | TABLES | more
 
 
 def network(**more: Any) -> dict[str, Any]:
@@ -476,14 +472,10 @@ def network(**more: Any) -> dict[str, Any]:
     return {"points": points, "lines": {"left": other, "right": line}} | TABLES
 
 
-def chosen_slack(events: Any) -> list[str]:
-    return [x.text for x in events if x.kind == "slack line as rods"]
-
-
 def test_a_cable_that_goes_slack_becomes_a_rod(tmp_path: Path) -> None:
     result = hybrid.run(cable(), tmp_path / "a.h5")
     assert result.status == "complete" and result.times[-1] == 2.0
-    (text,) = chosen_slack(result.events)
+    (text,) = texts_of(result, CHOSEN_SLACK)
     assert text.startswith("computed as rods") and "compression at t = " in text
     assert {x.kind for zones in result.zones for x in zones} == {"rod"}
     stiffness = 9.81 * 2.0 * 0.1**3  # under its weight it bends over a hundredth of its length
@@ -494,9 +486,9 @@ def test_a_cable_that_goes_slack_becomes_a_rod(tmp_path: Path) -> None:
 def test_a_line_of_a_system_that_goes_slack_becomes_a_rod() -> None:
     result = hybrid.run(network())
     assert result.status == "complete" and result.times[-1] == 2.0
-    (text,) = chosen_slack(result.events)
+    (text,) = texts_of(result, CHOSEN_SLACK)
     assert text.startswith("line right: computed as rods") and "no other line has changed" in text
-    assert not chosen_slack(result.lines["left"].events) and len(chosen_slack(result.lines["right"].events)) == 1
+    assert not texts_of(result.lines["left"], CHOSEN_SLACK) and len(texts_of(result.lines["right"], CHOSEN_SLACK)) == 1
     kinds = {name: {x.kind for zones in line.zones for x in zones} for name, line in result.lines.items()}
     assert kinds == {"left": {"catenary"}, "right": {"rod"}}
 
@@ -510,8 +502,7 @@ def test_a_catenary_that_is_asked_for_stops(scene: dict[str, Any]) -> None:
 
 def test_the_plan_says_what_a_slack_line_may_cost() -> None:
     """And counts steps whose loads still grow as those of grown loads: the motion of the end has a ramp of 1.6 s."""
-    open_, named = as_scene(network()), as_scene(network(model="catenary"))
-    assert isinstance(open_, Network) and isinstance(named, Network)
+    open_, named = system_of(network()), system_of(network(model="catenary"))
     assert open_.slack_becomes_rod and not named.slack_becomes_rod and _grown(open_) == 1.6
     plan = replace(hybrid.plan(open_, measure=False), seconds=8.0, most_seconds=19.0)
     said = " ".join(" ".join(plan_rows(open_, plan)).split())

@@ -16,7 +16,8 @@ from hybrid.scene.root import in_full
 from hybrid.simulation.run import new_run
 from hybrid.simulation.run_record import Recording
 from hybrid.store.format import MemoryTarget
-from tests.scenes import cable_scene, line_between, network_scene, pinned_at
+from tests.said import of_kind
+from tests.scenes import cable_scene, each_line, line_between, network_scene, pinned_at
 
 LIMIT, OVER = 450.0, 2.0  # N, s
 
@@ -64,10 +65,6 @@ def hanging(payout: dict[str, Any] | None = None, **tables: Any) -> dict[str, An
     ) | tables  # fmt: skip
 
 
-def of_guard(result: hybrid.Result) -> list[Any]:
-    return [x for x in result.events if x.kind == "part guard"]
-
-
 def out(result: hybrid.Result) -> np.ndarray:
     """Lengths (nt,) that are out, m."""
     return np.asarray(result["payout/length"])
@@ -77,7 +74,7 @@ def test_a_winch_stops_smoothly_when_a_tension_passes_a_limit() -> None:
     """After L + c T/2, with the rate c of the moment, and a rate (1 - 3 x^2 + 2 x^3) c on the way."""
     guard = Guard()
     result = hybrid.run(hanging(), parts=[guard])
-    (event,) = of_guard(result)
+    (event,) = of_kind(result, "part guard")
     assert guard.stopped is None, "a run has a copy"
     assert event.value > LIMIT and abs(event.value / LIMIT - 1) < 0.05
     x = np.clip((result.times - event.t) / OVER, 0, 1)
@@ -99,7 +96,7 @@ def test_it_goes_on_from_a_checkpoint_to_the_bit(
     limit = LIMIT if payout is None else 410.0
     scene = hybrid.validate_scene(hanging(payout, time={"duration": 8, "step": 0.02} | time))
     whole = hybrid.run(scene, tmp_path / "whole.h5", parts=[Guard(limit)])
-    (event,) = of_guard(whole)
+    (event,) = of_kind(whole, "part guard")
     assert event.t < 6.0 and np.ptp(out(whole)[whole.times > event.t + OVER]) < 1e-12
     steps = whole["steps/t"]
     at = [int(np.searchsorted(steps, t)) for t in (0.0, event.t - 0.3, event.t + 0.5, event.t + 2.5)]
@@ -120,7 +117,9 @@ def test_a_simulation_stops_and_goes_back_as_the_run() -> None:
         while steps.t < 7:
             steps.step()
     stepped = steps.result()
-    assert [x.t for x in of_guard(stepped)] == pytest.approx([x.t for x in of_guard(whole)], abs=1e-9)
+    assert [x.t for x in of_kind(stepped, "part guard")] == pytest.approx(
+        [x.t for x in of_kind(whole, "part guard")], abs=1e-9
+    )
     assert out(stepped)[-1] == pytest.approx(out(whole)[-1], abs=1e-6)
 
 
@@ -149,9 +148,7 @@ def test_a_winch_of_one_of_two_lines_with_zones_that_move_stops() -> None:
         time=(4, 0.02), output=0.1
     )  # fmt: skip
     scene["lines"]["up"]["connections"]["end"]["payout"]["longest"] = 50
-    for line in scene["lines"].values():
-        line |= {"model": "adaptive", "mesh": {"cells": 20}}
-    result = hybrid.run(scene, parts=[At(2.5, "up")])
+    result = hybrid.run(each_line(scene, model="adaptive", mesh=20), parts=[At(2.5, "up")])
     length = np.asarray(result.lines["up"]["payout/length"])
     assert length[-1] == pytest.approx(40 + 1 + 0.52 + 0.25, abs=1e-9) and np.ptp(length[31:]) < 1e-12
 

@@ -12,8 +12,8 @@ import hybrid
 from hybrid.cli.tables import zones_over_time
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
-from tests.inside import OnlyLine
-from tests.scenes import clamped_at, pinned_at
+from tests.inside import OnlyLine, calls_of
+from tests.scenes import cable_scene, clamped_at, pinned_at
 from tests.simulation.test_payout import G, hanging
 from tests.simulation.test_payout_zones import touching
 
@@ -76,12 +76,9 @@ def test_cells_behind_a_clamped_winch_are_short_where_no_mesh_is_given(rate: flo
     other = {"end": "start", "start": "end"}[side]
     tangent = [1.0 if side == "end" else -1.0, 0.0, 0.0]
     section = {"length": 100.0, "mass": 8.0, "axial_stiffness": 1e7, "bending_stiffness": 1e3}
-    scene: dict[str, Any] = {
-        "cable": {"sections": [section]},
-        "ends": {other: pinned_at(0, 0, -45),
-                 side: clamped_at([75, 0, 0], tangent, payout={"rates": [[0, 0], [1, rate]]})},
-        "initial": "equilibrium", "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 1.0, "errors": False}
-    }  # fmt: skip
+    held = clamped_at([75, 0, 0], tangent, payout={"rates": [[0, 0], [1, rate]]})
+    ends = {other: pinned_at(0, 0, -45), side: held}
+    scene = cable_scene(section, **ends, time=(4.0, 0.1), output={"every": 1.0, "errors": False})
     found = hybrid.run(scene | {"model": {"kind": "adaptive", "curvature_error": 0.05}})
     fine = hybrid.run(scene | {"model": "rod", "mesh": {"cells": 400}})
     assert "unresolved bend" not in {event.kind for event in found.events}
@@ -138,17 +135,12 @@ OF_ENDS = ("reaction_", "tension", "envelope/tension_")
 
 def scene(winch: str, model: str, rate: float, **end: Any) -> dict[str, Any]:
     """20 m sagging over 16 m, dense enough to bend; nodes enter or leave at `winch`, which is clamped where asked."""
-    far = "start" if winch == "end" else "end"
     section = {"length": 20.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6}
     if model == "rod":
         section |= {"bending_stiffness": 200.0}
-    at: dict[str, Any] = {"start": [0, 0, 0], "end": [16, 0, 0]}
-    held = {"kind": "pinned", "position": at[winch], "payout": {"rate": rate, "ramp": 0.5}} | end
-    return {
-        "cable": {"sections": [section]}, "initial": "equilibrium", "model": model, "mesh": {"cells": 20},
-        "ends": {winch: held, far: {"kind": "pinned", "position": at[far]}}, "time": {"duration": 3.0, "step": 0.05},
-        "output": {"every": 0.35},
-    }  # fmt: skip
+    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(16, 0, 0)}
+    ends[winch] |= {"payout": {"rate": rate, "ramp": 0.5}} | end
+    return cable_scene(section, **ends, model=model, mesh=20, time=(3.0, 0.05), output=0.35)
 
 
 @pytest.mark.parametrize(
@@ -163,11 +155,7 @@ def test_nodes_enter_and_leave_as_by_python(
     winch: str, model: str, rate: float, end: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = scene(winch, model, rate, **end)
-    one_by_one: list[float] = []
-    change = PayingOut.change
-    monkeypatch.setattr(
-        PayingOut, "change", lambda paying, run, *more: (one_by_one.append(run.t), change(paying, run, *more))[1]
-    )
+    one_by_one = calls_of(monkeypatch, PayingOut, "change")
     found = hybrid.run(given)
     assert not one_by_one
     monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
@@ -196,11 +184,9 @@ def test_torque_stays_even_where_nodes_enter_and_leave(winch: str, rate: float, 
     held = {"kind": "clamped", "position": [0, 0, 0], **up, "payout": {"rate": rate, "ramp": 0.2}}
     turned = {winch: held, far: pulled}
     turned["end"] |= {"turns": 1}
-    result = hybrid.run({
-        "cable": {"sections": [section | {"torsional_stiffness": 0.16}]}, "model": "rod", "mesh": {"cells": 40},
-        "ends": turned, "initial": "equilibrium", "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.02},
-        "dimension": 3, **more,
-    })  # fmt: skip
+    section |= {"torsional_stiffness": 0.16}
+    given = cable_scene(section, **turned, model="rod", mesh=40, time=(1.5, 0.01), output=0.02, dimension=3)
+    result = hybrid.run(given | more)
     length = result["payout/length"]
     assert abs(length[-1] - length[0]) > 5 * out / 40  # nodes have entered, or left
     expected = 2.0 * np.pi * 0.16 / length

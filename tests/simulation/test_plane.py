@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bits import resumed
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipk
 
 import hybrid
@@ -17,6 +18,7 @@ from hybrid.errors import SceneError
 from hybrid.model.build import WHAT, build
 from hybrid.scene.read import one_line
 from hybrid.simulation.lone_planes import LonePlane
+from tests.said import texts_of
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -43,10 +45,6 @@ def example(name: str, steps: int = 300, **tables: Any) -> hybrid.Scene:
     return scene(what, **tables)
 
 
-def planes(result: hybrid.Result) -> list[str]:
-    return [e.text for e in result.events if e.kind == "out of plane"]
-
-
 def entry(asked: hybrid.Scene) -> Any:
     return next(x for x in hybrid.plan(asked).contents if x.what == WHAT)
 
@@ -58,7 +56,7 @@ def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
     space = hybrid.run(example(name, dimension=3))
     for asked in ({}, {"dimension": 2}):
         flat = hybrid.run(example(name, **asked))
-        assert not planes(flat)
+        assert not texts_of(flat, "out of plane")
         assert np.abs(flat.position - space.position).max() < SAME * space.s[-1]
         assert np.abs(flat.tension - space.tension).max() < 10 * SAME * np.abs(space.tension).max()
         assert [len(z) for z in flat.zones] == [len(z) for z in space.zones]
@@ -101,9 +99,7 @@ def turned(what: Any, R: np.ndarray) -> Any:
 
 
 def about(axis: tuple[float, float, float], angle: float) -> np.ndarray:
-    a = np.array(axis) / np.linalg.norm(axis)
-    K = np.cross(np.eye(3), a)
-    return np.eye(3) + np.sin(angle) * -K + (1 - np.cos(angle)) * K @ K
+    return Rotation.from_rotvec(angle * np.array(axis) / np.linalg.norm(axis)).as_matrix()
 
 
 @cache
@@ -132,7 +128,7 @@ def test_any_vertical_plane_and_any_where_nothing_is_heavy(name: str, R: np.ndar
     found = hybrid.run(asked)
     assert np.abs(found.position - straight.position @ R.T).max() < SAME * straight.s[-1]
     if name != "05_cantilever":
-        assert not planes(found)
+        assert not texts_of(found, "out of plane")
         assert np.abs(found.velocity @ (R @ [0, 1, 0])).max() < 1e-12 * np.abs(found.velocity).max()
 
 
@@ -164,26 +160,18 @@ def test_random_scenes_in_a_vertical_plane() -> None:
             "damping": {"mass": 0.1, "stiffness": 0.01},
         }  # fmt: skip
         a = float(g.uniform(12, 17))
-        what = {
-            "environment": {
-                "fluid": {"density": 1025, "surface": 0, "current": [0.3 * x, 0.3 * y, 0]},
-                "seabed": {"z": -9.0, "stiffness": 1000.0, "damping": 100.0, "friction": 0.4 if seed % 2 else 0},
-            },
-            "cable": {
-                "sections": [section, section | {"mass": 1.5}],
-                "attachments": [{"kind": "float", "at": 8.0, "mass": 0.2, "volume": 0.0005, "drag_area": 0.01}],
-            },
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, 0],
-                          "motion": {"heave": {"amplitude": 0.2, "period": 3}, "velocity": [0.1 * x, 0.1 * y, 0], "ramp": 2}},
-                "end": {"kind": "clamped", "position": [a * x, a * y, -8.0], "tangent": [x, y, -0.2]},
-            },
-            "initial": {"kind": "equilibrium", "friction": "neglected"},  # settled, all six hold in space
-            "model": ["rod", "adaptive", {"zones": [{"catenary": 3}, {"rod": 17}]}][seed % 3],
-            "time": {"duration": 3.0, "step": 0.05},
-        }  # fmt: skip
+        moved = {"heave": {"amplitude": 0.2, "period": 3}, "velocity": [0.1 * x, 0.1 * y, 0], "ramp": 2}
+        what = cable_scene(
+            [section, section | {"mass": 1.5}],
+            pinned_at(0, 0, 0, motion=moved), clamped_at([a * x, a * y, -8.0], [x, y, -0.2]),
+            attachments=[{"kind": "float", "at": 8.0, "mass": 0.2, "volume": 0.0005, "drag_area": 0.01}],
+            fluid={"density": 1025, "surface": 0, "current": [0.3 * x, 0.3 * y, 0]},
+            seabed={"z": -9.0, "stiffness": 1000.0, "damping": 100.0, "friction": 0.4 if seed % 2 else 0},
+            initial={"kind": "equilibrium", "friction": "neglected"},  # settled, all six hold in space
+            model=["rod", "adaptive", {"zones": [{"catenary": 3}, {"rod": 17}]}][seed % 3], time=(3.0, 0.05),
+        )  # fmt: skip
         flat, space = (hybrid.run(scene(what, dimension=d)) for d in (2, 3))
-        if planes(flat):  # an equilibrium that holds in the plane alone: in space another is sought
+        if texts_of(flat, "out of plane"):  # an equilibrium that holds in the plane alone: in space another is sought
             told += 1
             flat = hybrid.run(scene(what))
         assert np.abs(flat.position - space.position).max() < SAME * 20, seed
@@ -211,9 +199,9 @@ def deep_beam(part: float, **tables: Any) -> hybrid.Scene:
 def test_a_deep_beam_topples_where_prandtl_says() -> None:
     """Prandtl (1899), Michell (1899): below the load nothing grows, above it the beam leaves the plane; within 5 %."""
     calm = hybrid.run(deep_beam(0.95))
-    assert not planes(calm) and np.abs(calm.position[..., 1]).max() == 0.0
+    assert not texts_of(calm, "out of plane") and np.abs(calm.position[..., 1]).max() == 0.0
     topples = hybrid.run(deep_beam(1.05))
-    assert len(planes(topples)) == 1
+    assert len(texts_of(topples, "out of plane")) == 1
     assert np.abs(topples.position[..., 1]).max() > 0.02
 
 
@@ -224,7 +212,7 @@ def test_in_space_nothing_would_have_been_seen() -> None:
 
 def test_who_insists_on_a_plane_is_told() -> None:
     result = hybrid.run(deep_beam(1.05, dimension=2))
-    assert len(planes(result)) == 1 and "dimension: 3" in planes(result)[0]
+    assert len(texts_of(result, "out of plane")) == 1 and "dimension: 3" in texts_of(result, "out of plane")[0]
     assert np.abs(result.position[..., 1]).max() == 0.0
 
 
@@ -234,7 +222,7 @@ def test_equilibria_that_hold_in_the_plane_alone() -> None:
     what["ends"]["end"] = {"kind": "free", "force": [-0.03, 0.0, 0.0]}  # 1.2 times Euler's load for EI
     what["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}
     flat = hybrid.static(scene(what, dimension=2))
-    assert planes(flat) and np.abs(flat.position[0, :, 1:]).max() < 1e-9
+    assert texts_of(flat, "out of plane") and np.abs(flat.position[0, :, 1:]).max() < 1e-9
     with hybrid.static(scene(what)) as bent:
         assert {x.kind for x in bent.events} == {"several equilibria", "compression"}
         tip = bent.position[0, -1]
@@ -280,7 +268,7 @@ def test_a_string_whose_tension_swings_twice_as_fast_as_it_does(period: float, g
         gravity=0.0, model="catenary", mesh=20, time=(80.0, 0.02, 0.9)
     )  # fmt: skip
     result = hybrid.run(scene(what))
-    assert bool(planes(result)) == grows
+    assert bool(texts_of(result, "out of plane")) == grows
 
 
 # --- what is not in a plane ----------------------------------------------------------------------

@@ -30,8 +30,8 @@ def pinned(**release: Any) -> dict[str, Any]:
     return {"kind": "pinned", "position": [8, 0, 0], **release}
 
 
-def masses() -> np.ndarray:
-    out = np.full(21, 10.0 / 20)
+def masses(cells: int = 20, mass: float = 10.0) -> np.ndarray:
+    out = np.full(cells + 1, mass / cells)
     out[[0, -1]] *= 0.5
     return out
 
@@ -210,12 +210,6 @@ def scene_break(
     return {"points": at, "lines": both, "time": time, "output": {"every": 0.05, "points": 13}} | more
 
 
-def masses_break() -> np.ndarray:
-    out = np.full(13, 2.0)
-    out[[0, -1]] *= 0.5
-    return out
-
-
 def test_a_line_that_breaks_from_its_anchor_leaves_what_it_carried_to_the_others() -> None:
     """The weight swings on the line that is left; nothing pulls at the broken end, and the anchor stays."""
     with hybrid.run(scene_break(lines={"b": {"break_at": {"time": 0.5}}})) as result:
@@ -239,11 +233,11 @@ def test_lines_that_break_from_all_fall_as_bodies(end: str) -> None:
         t = result.t[result.t > 0.3 + 1e-9] - 0.3
         name = next(iter(lines))
         r = result.lines[name].position
-        centre = np.einsum("i,tik->tk", masses_break(), r) / masses_break().sum()
+        centre = np.einsum("i,tik->tk", masses(12, 24.0), r) / 24.0
         np.testing.assert_allclose(centre[7:, 2] - centre[6, 2], -0.5 * 9.81 * t**2, rtol=0, atol=2e-5)
         np.testing.assert_allclose(centre[7:, 0], centre[6, 0], rtol=0, atol=2e-5)
         r = result.lines["a" if name == "b" else "b"].position
-        m = np.append(masses_break(), 30.0)
+        m = np.append(masses(12, 24.0), 30.0)
         with_weight = np.concatenate([r, result["points/weight/position"][:, None]], axis=1)
         centre = np.einsum("i,tik->tk", m, with_weight) / m.sum()
         np.testing.assert_allclose(centre[7:, 2] - centre[6, 2], -0.5 * 9.81 * t**2, rtol=0, atol=2e-5)

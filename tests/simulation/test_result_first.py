@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bits import Stopping, differences
-from controlled import OneLine
+from controlled import OneLine, made_up
 from test_late_file import described
 from typer.testing import CliRunner
 
@@ -37,6 +37,7 @@ from hybrid.store.whole_file import LateFile
 from hybrid.view.panels import page_of
 from hybrid.view.report import card
 from hybrid.view.summary import facts_of
+from tests.inside import calls_of
 from tests.scenes import line_between, network_scene
 
 ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"
@@ -99,9 +100,7 @@ def test_stopped_after_the_result(scene: dict[str, Any], tmp_path: Path, monkeyp
     Runs to compare with that had ended are not computed again: those of several lines were.
     """
     Stopping(monkeypatch)
-    compared: list[object] = []
-    sample = Case.sample
-    monkeypatch.setattr(Case, "sample", lambda self, *x, **y: compared.append(x) or sample(self, *x, **y))
+    compared = calls_of(monkeypatch, Case, "sample")
     hybrid.run(scene, tmp_path / "whole.h5").close()
     for name, pending in ((ESTIMATION, ERRORS), (REFINEMENT, FINER)):
         folder = tmp_path / name
@@ -240,18 +239,14 @@ def test_a_comparison_that_fails_in_motion_is_of_a_finer_result(
     scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Cells and steps half as long, so that the next is as fine as the result that came to its end."""
-    record, sample, finely = Case.record, Case.sample, list[Any]()
-
-    def recorded(self: Case, resolution: Any, *more: Any) -> Any:
-        finely.append(resolution.one)
-        return record(self, resolution, *more)
+    finely = calls_of(monkeypatch, Case, "record", lambda _, resolution, *more: resolution.one)
+    sample = Case.sample
 
     def failing(self: Case, resolution: Any, *more: Any, **named: Any) -> Any:
         if len(finely) == 1:
             raise ComputationError(Outcome.SINGULAR, 1.0, 0.0)
         return sample(self, resolution, *more, **named)
 
-    monkeypatch.setattr(Case, "record", recorded)
     monkeypatch.setattr(Case, "sample", failing)
     with hybrid.run(scene, tmp_path / "run.h5") as result:
         first, second = finely[:2]
@@ -342,14 +337,6 @@ def test_a_finer_result_is_no_file_before_it_is_complete(tmp_path: Path, monkeyp
 # --- What a refinement returns is never worse than the run before it ---
 
 ASKED = RequestedAccuracy(0.005, None, None)
-
-
-def made_up(fineness: float = 1.0, steps: int = 100, off: float = 0.0) -> RunSample:
-    """A run whose position is off by 0.01 m/fineness^2, and by `off` at one point and output."""
-    position = np.full((9, 4, 3), 0.01 / fineness**2)
-    position[5, 2] += off
-    resolution = Resolution(fineness, 10.0 / steps, 1e-6, 1e-3)
-    return RunSample(resolution, {"position": position}, round(100 * fineness), steps, 0.0)
 
 
 def comparisons() -> list[RunSample]:

@@ -23,6 +23,7 @@ from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import pack, unpack
 from hybrid.zones import change as zone_changes
+from tests.inside import calls_of
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -30,16 +31,11 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 def swinging(**more):
     """A chain of 1 m that swings for 2 s, in steps of 0.01 s."""
-    data = {
-        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "diameter": 0.02, "drag": {"normal": 1.0}}]},
-        "environment": {"fluid": {"density": 100.0}},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
-        "initial": {"kind": "straight", "direction": [0.6, 0, -0.8]},
-        "model": "catenary",
-        "mesh": {"cells": 20},
-        "time": {"duration": 2.0, "step": 0.01},
-        "output": {"every": 0.1, "points": 11, "errors": False},
-    }
+    data = cable_scene(
+        {"length": 1.0, "mass": 1.0, "diameter": 0.02, "drag": {"normal": 1.0}}, pinned_at(0, 0, 0), {"kind": "free"},
+        initial={"kind": "straight", "direction": [0.6, 0, -0.8]}, fluid={"density": 100.0}, model="catenary", mesh=20,
+        time=(2.0, 0.01), output={"every": 0.1, "points": 11, "errors": False},
+    )  # fmt: skip
     return hybrid.validate_scene(data | more)
 
 
@@ -50,10 +46,7 @@ def whole(tmp_path):
 
 
 def stopped(path: Path, monkeypatch, scene=None, after: int = 150) -> Path:
-    stopping = Stopping(monkeypatch)
-    stopping.left = after
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene or swinging(), path, progress=stopping)
+    Stopping(monkeypatch).stop(after, hybrid.run, scene or swinging(), path)
     return path
 
 
@@ -120,14 +113,10 @@ def test_a_change_is_made_where_the_run_stands_and_not_at_its_last_output(tmp_pa
 # ---- refusals --------------------------------------------------------------------------------------
 
 
-def test_there_is_nothing_left_of_a_complete_run(whole):
-    with pytest.raises(hybrid.ResultError, match=r"(?s)complete.*--until"):
-        hybrid.resume(whole)
-
-
 @pytest.mark.parametrize(
     ("more", "match"),
     [
+        ({}, r"(?s)complete.*--until"),
         ({"until": 1.0}, "until"),
         ({"until": float("inf")}, "until"),
         ({"until": 3.0, "start": 2.5}, "from"),
@@ -144,7 +133,7 @@ def test_there_is_nothing_left_of_a_complete_run(whole):
 )
 def test_what_cannot_be_is_refused_and_the_file_stays(more, match, whole):
     before = whole.read_bytes()
-    with pytest.raises(hybrid.errors.HybridError, match=match):
+    with pytest.raises(hybrid.errors.HybridError if more else hybrid.ResultError, match=match):
         hybrid.resume(whole, **more)
     assert whole.read_bytes() == before
     assert [x.name for x in whole.parent.iterdir()] == [whole.name]
@@ -289,21 +278,14 @@ def test_a_folder_that_is_read_only(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-def test_the_command_goes_on_and_says_so(tmp_path, monkeypatch, capsys):
-    from hybrid.cli.commands import main
-
-    path = stopped(tmp_path / "run.h5", monkeypatch)
-    with pytest.raises(SystemExit) as done:
-        main(["resume", str(path), "--json"])
-    assert not done.value.code
-    last = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert last["status"] == "complete" and last["t"] == 2.0
-    with pytest.raises(SystemExit) as done:
-        main(["resume", str(path)])
-    assert done.value.code == 1 and "nothing left to do" in capsys.readouterr().err
-    with pytest.raises(SystemExit) as done:
-        main(["resume", str(path), "--until", "2.5", "--set", "environment.fluid.current=[0.2,0,0]", "--from", "2.2"])
-    assert not done.value.code and "the last 0.5 s" in " ".join(capsys.readouterr().out.split())
+def test_the_command_goes_on_and_says_so(tmp_path, monkeypatch, call):
+    path = str(stopped(tmp_path / "run.h5", monkeypatch))
+    done = call("resume", path, "--json")
+    assert not done.code and done.lines[-1]["status"] == "complete" and done.lines[-1]["t"] == 2.0
+    done = call("resume", path)
+    assert done.code == 1 and "nothing left to do" in done.err
+    done = call("resume", path, "--until", "2.5", "--set", "environment.fluid.current=[0.2,0,0]", "--from", "2.2")
+    assert not done.code and "the last 0.5 s" in " ".join(done.out.split())
 
 
 # ---- versions --------------------------------------------------------------------------------------
@@ -393,10 +375,7 @@ def test_an_end_that_would_turn_at_once_is_refused(setting, tmp_path):
 
 def test_an_end_before_a_change_is_refused(tmp_path, monkeypatch, whole):
     more = {"settings": ["environment.fluid.current=[0.4, 0, 0]"], "start": 2.6, "until": 3.0}
-    stopping = Stopping(monkeypatch)
-    stopping.left = 20
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.resume(whole, progress=stopping, **more)
+    Stopping(monkeypatch).stop(20, hybrid.resume, whole, **more)
     with pytest.raises(hybrid.SceneError, match=r"after the change at 2\.6 s"):
         hybrid.resume(whole, until=2.5)
 
@@ -446,21 +425,15 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
 
 def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
     """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
-    monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)
     monkeypatch.setattr(hybrid.simulation.run_record, "WORK", 20 * 40)  # 40 steps of 20 cells
     monkeypatch.setattr(hybrid.solve.network_steps, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
-    places, kept, keep = [], [], record.Recorder.checkpoint
-
-    def noted(self, content):
-        keep(self, content)
-        places[-1].append(self.last)
-
-    monkeypatch.setattr(record.Recorder, "checkpoint", noted)
+    places, kept, last = [], [], calls_of(monkeypatch, record.Recorder, "checkpoint", after=lambda _, x, *__: x.last)
     for k, pause in enumerate((0.0, 1e9)):
         monkeypatch.setattr(record, "pause", lambda _, pause=pause: pause)
         monkeypatch.setattr(record, "_PART", 0.0)
-        places.append([])
         hybrid.run(swinging(), tmp_path / f"{k}.h5").close()
+        places.append([*last])
+        last.clear()
         with opened(tmp_path / f"{k}.h5") as file:
             points = [whole_file._checkpoint(unpack(bytes(file[name][()]))) for name in whole_file.SLOTS]
         kept.append([(x.number, x.t, x.rows, x.state["steps"]) for x in points])

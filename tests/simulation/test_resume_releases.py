@@ -285,11 +285,7 @@ def test_many_checkpoints_of_other_content(stopped_half_way: Path) -> None:
 def test_checkpoints_of_adaptive_runs(name: str, many: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Moving zones, friction, the energy balance of a plane: more that can be forged."""
     more = ["mesh.cells=20", "output={every: 1, points: 7, errors: false}", "time={duration: 4, step: 0.1}"]
-    stopping = Stopping(monkeypatch)
-    stopping.left = 25
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(
-            hybrid.load_scene(EXAMPLES / f"{name}.yaml", more), tmp_path / "stopped_half_way.h5", progress=stopping
-        )
-    count = forgeries(tmp_path / "stopped_half_way.h5", 5000, 5000 + many)
+    path = tmp_path / "stopped_half_way.h5"
+    Stopping(monkeypatch).stop(25, hybrid.run, hybrid.load_scene(EXAMPLES / f"{name}.yaml", more), path)
+    count = forgeries(path, 5000, 5000 + many)
     assert count["refused"] > 2 * many // 3

@@ -19,6 +19,7 @@ from hybrid.simulation import case as cases
 from hybrid.simulation.progress import REFINEMENT, Progress
 from hybrid.store.hdf5_file import opened
 from hybrid.store.whole_file import read_before
+from tests.inside import calls_of
 
 TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 
@@ -99,9 +100,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(
     Stopping(monkeypatch)
     for file in made(name).iterdir():
         shutil.copy(file, tmp_path)
-    computed: list[object] = []
-    sample = cases.Case.sample
-    monkeypatch.setattr(cases.Case, "sample", lambda self, *x, **y: computed.append(x) or sample(self, *x, **y))
+    computed = calls_of(monkeypatch, cases.Case, "sample")
     if harm is not None:
         harm(rows(tmp_path)[1])
     hybrid.resume(tmp_path / "run.h5").close()
@@ -160,9 +159,7 @@ def test_killed_and_resumed(made: Callable[[str], Path], tmp_path: Path, monkeyp
     with hybrid.open(tmp_path / "run.h5") as result:
         assert "finer result" in result.pending and "errors/total/position" in result
     assert not (tmp_path / ".run.h5.lock").exists()  # it was left, and opening has removed it
-    computed: list[object] = []
-    sample = cases.Case.sample
-    monkeypatch.setattr(cases.Case, "sample", lambda self, *x, **y: computed.append(x) or sample(self, *x, **y))
+    computed = calls_of(monkeypatch, cases.Case, "sample")
     hybrid.resume(tmp_path / "run.h5").close()
     assert not computed and not rows(tmp_path)
     assert differences(made("rods") / "whole.h5", tmp_path / "run.h5") == []

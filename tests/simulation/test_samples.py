@@ -15,6 +15,7 @@ import hybrid.simulation.run_record
 from hybrid.errors import SceneError
 from hybrid.simulation import run_line
 from hybrid.store.recorder import Rows
+from tests.inside import calls_of
 from tests.scenes import cable_scene, clamped_at, line_between, network_scene
 
 ROD = {
@@ -98,14 +99,7 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     """Those of a batch have each their own ratios: the same bits as one output at a time."""
     settings = ["time.duration=30", "output.criteria=true"]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", settings)
-    batches: list[int] = []
-    save = Rows.save_batch
-
-    def counted(self: Rows, times: np.ndarray, *more: Any) -> None:
-        batches.append(times.size)
-        save(self, times, *more)
-
-    monkeypatch.setattr(Rows, "save_batch", counted)
+    batches = calls_of(monkeypatch, Rows, "save_batch", lambda _, times, *more: times.size)
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
     monkeypatch.setattr(run_line, "WAITING", 1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences, went_on
+from bits import Stopping, differences, resumed, went_on
 
 import hybrid
 import hybrid.model.build
@@ -27,8 +27,8 @@ from hybrid.scene.root import LINE
 from hybrid.simulation import run as run_module
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_contact import RunContact
-from hybrid.simulation.run_sample import Samples
 from hybrid.solve.contact import SelfContact
+from tests.inside import calls_of
 from tests.said import kinds, work_put_in
 from tests.scenes import cable_scene, pinned_at
 
@@ -54,15 +54,8 @@ def led_through(**more: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("led") / "whole.h5"
-    hybrid.run(led_through(), path).close()
-    return path
-
-
-@pytest.fixture(scope="module")
-def led(whole: Path) -> hybrid.Result:
-    return hybrid.open(whole)
+def led() -> hybrid.Result:
+    return hybrid.run(led_through())
 
 
 def test_a_line_in_a_plane_touches_itself_without_being_asked(led: hybrid.Result) -> None:
@@ -98,9 +91,7 @@ def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytes
     stopping, scene = Stopping(monkeypatch), led_through(time={"duration": 0.2, "step": 0.02})
     with monkeypatch.context() as before:
         before.setattr(hybrid.model.build, "contact_bits", lambda scene: 0)
-        stopping.left = 4
-        with pytest.raises(KeyboardInterrupt):
-            hybrid.run(scene, tmp_path / "run.h5", progress=stopping)
+        stopping.stop(4, hybrid.run, scene, tmp_path / "run.h5")
     with hybrid.resume(tmp_path / "run.h5") as result:
         assert result.status == "complete" and result.times[-1] == 0.2 and "self_contact" not in result
         assert one_line(hybrid.parse_scene(result.scene_text)).contact.self is None
@@ -315,7 +306,9 @@ def test_it_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, travels: li
 WINCH = {"tension": 3.0, "inertia": 2.0, "damping": 3.0, "max_rate": 0.5, "ramp": 1.0}
 
 
-def crossing(side: str = "end", model: Any = "rod", winch: dict[str, float] | None = None, **more: Any) -> hybrid.Scene:
+def crossing(
+    side: str = "end", model: Any = "rod", winch: dict[str, float] | None = None, **more: Any
+) -> dict[str, Any]:
     """A line hangs from a winch; its far end is led past the winch through the other leg, which goes on to grow."""
     section = {
         "length": 5.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
@@ -323,15 +316,12 @@ def crossing(side: str = "end", model: Any = "rod", winch: dict[str, float] | No
     }  # fmt: skip
     payout = {"longest": 8.0} | ({"rate": 0.4, "ramp": 1.0} if winch is None else {"winch": winch})
     led = {"travel": {"by": [-2.8, 0.5 * WIDTH, 0.0], "over": 4.0}}
-    ends = {
-        side: {"kind": "pinned", "position": [0.1, 0, 0], "payout": payout},
-        "start" if side == "end" else "end": {"kind": "pinned", "position": [2.5, 0, -0.5], "motion": led},
-    }
-    return hybrid.validate_scene({
-        "cable": {"sections": [section]}, "model": model, "mesh": {"cells": 100}, "initial": "equilibrium",
-        "contact": {"self": True, "friction": 0.3}, "ends": ends, "time": {"duration": 3.2, "step": 0.01},
-        "output": {"every": 0.02, "points": 41}, **more,
-    })  # fmt: skip
+    far, held = pinned_at(2.5, 0, -0.5, motion=led), pinned_at(0.1, 0, 0, payout=payout)
+    ends = (far, held) if side == "end" else (held, far)
+    return cable_scene(
+        section, *ends, model=model, mesh=100, contact={"self": True, "friction": 0.3}, time=(3.2, 0.01),
+        output=(0.02, 41)
+    ) | more  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -360,21 +350,17 @@ def test_the_mirror_image(rod: hybrid.Result) -> None:
 @pytest.mark.parametrize("more", [{"model": "adaptive"}, {"winch": WINCH, "side": "start"}], ids=["zones", "winch"])
 def test_it_resumes_to_the_last_bit(tmp_path: Path, rod: hybrid.Result, more: dict[str, Any]) -> None:
     """Stopped while strands touch; zones that move touch as rods do."""
-    whole = hybrid.run(crossing(**more))
+    whole = resumed(crossing(**more), tmp_path, 2.9)
     touches = whole.times[whole["energy/self_contact"] > 0.0]
     assert touches[0] < 2.9 < touches[-1]
     if "model" in more:
         assert any(zone.kind == "catenary" for zones in whole.zones for zone in zones)
         assert whole["energy/self_contact"].max() == pytest.approx(rod["energy/self_contact"].max(), rel=0.1)
         assert np.linalg.norm(whole["position"] - rod["position"], axis=2).max() < 0.01 * 5.0
-    hybrid.run(crossing(**more, time={"duration": 2.9, "step": 0.01}), tmp_path / "part.h5").close()
-    with hybrid.resume(tmp_path / "part.h5", until=3.2) as resumed:
-        for name in (x for x in whole.names if x.startswith(("position", "tension", "energy/", "work/", "self"))):
-            assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
 
 
 def test_sections_on_the_reel_need_a_diameter() -> None:
-    scene = crossing().model_dump(exclude_unset=True, by_alias=True)
+    scene = crossing()
     scene["ends"]["end"]["payout"]["reel"] = [
         {"length": 4.0, "mass": 0.4, "axial_stiffness": 1e5, "bending_stiffness": 1.0}
     ]
@@ -391,16 +377,7 @@ OUTPUT = {"every": 0.1, "points": 21, "errors": True}
 @pytest.fixture
 def touched(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether contact was computed, of every run to compare with."""
-    found: list[bool] = []
-    sample = Case.sample
-
-    def noted(self: Case, *args: Any, **more: Any) -> Samples:
-        run = sample(self, *args, **more)
-        found.append(run[LINE].touches)
-        return run
-
-    monkeypatch.setattr(Case, "sample", noted)
-    return found
+    return calls_of(monkeypatch, Case, "sample", after=lambda run, *_: run[LINE].touches)
 
 
 @pytest.mark.parametrize(

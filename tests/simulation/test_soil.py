@@ -52,15 +52,12 @@ def history(depths: Floats) -> Floats:
 
 def pressed(bed: dict[str, Any], over: float, step: float, motion: dict[str, Any], **more: Any) -> dict[str, Any]:
     """A stiff rod of a metre, level, both ends of which follow one motion from 2 cm above the bed."""
-    ends = {name: pinned_at(x, 0, 0.02, motion={"ramp": 1.0} | motion) for name, x in (("start", 0.0), ("end", 1.0))}
-    return {
-        "environment": {"gravity": 0, "seabed": {"z": 0} | bed},
-        "cable": {"sections": [{"length": 1.0, "mass": 20.0, "diameter": D, "axial_stiffness": 1e8,
-                                "bending_stiffness": 1e6, "damping": 2.0}]},
-        "ends": ends, "initial": {"kind": "straight", "origin": [0, 0, 0.02], "direction": [1, 0, 0]},
-        "model": "rod", "contact": {"self": False}, "mesh": {"cells": 6},
-        "time": {"duration": over, "step": step}, "output": {"every": step, "points": 7, "exact": True},
-    } | more  # fmt: skip
+    rod = {"length": 1.0, "mass": 20.0, "diameter": D, "axial_stiffness": 1e8, "bending_stiffness": 1e6, "damping": 2.0}
+    return cable_scene(
+        rod, *(pinned_at(x, 0, 0.02, motion={"ramp": 1.0} | motion) for x in (0.0, 1.0)), gravity=0, seabed={"z": 0} | bed,
+        initial={"kind": "straight", "origin": [0, 0, 0.02], "direction": [1, 0, 0]}, model="rod", contact={"self": False},
+        mesh=6, time=(over, step), output={"every": step, "points": 7, "exact": True},
+    ) | more  # fmt: skip
 
 
 HEAVE = [{"amplitude": 0.06, "period": 8.0, "phase": -90.0}, {"amplitude": 0.004, "period": 1.7}]

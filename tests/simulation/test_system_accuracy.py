@@ -17,7 +17,7 @@ from hybrid.scene.analysis import RodModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import COMPARED, END_FORCES, RIGHT
 from hybrid.store.limits import extreme_errors
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene
 
 LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 
@@ -43,31 +43,19 @@ def bridle(**tables: Any) -> dict[str, Any]:
     } | tables  # fmt: skip
 
 
-def with_zones() -> dict[str, Any]:
-    """The same with zones that move in the line that bends, whose share is given: no accuracy makes all of it rod."""
-    scene = bridle()
-    scene["lines"]["tow"]["model"] = {"kind": "adaptive", "tolerance": 1e-3}
-    return scene
-
-
-@pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
-    path = tmp_path_factory.mktemp("accuracy") / "run.h5"
-    hybrid.run(with_zones(), path).close()
-    return hybrid.open(path)
-
-
 def verdicts(line: hybrid.Result) -> dict[str, dict[str, Any]]:
     met = {"met": True, "missed": False, "not verified": None}
     return {x.quantity: x._asdict() | {"met": met[x.verdict]} for x in line.verdicts().accuracy}
 
 
 @pytest.mark.long  # 1.0 s
-def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> None:
-    scene = bridle(time={"duration": 4.0, "step": 0.0125}, accuracy=None)  # all that bends is rod
-    for line in scene["lines"].values():
-        line["mesh"] = {"cells": 150}
-    fine, tow = hybrid.run(scene), result.lines["tow"]
+def test_what_is_asked_is_judged_by_line_and_quantity() -> None:
+    """Of zones that move in the line that bends, whose share is given: no accuracy makes all of it rod."""
+    scene = bridle()
+    scene["lines"]["tow"]["model"] = {"kind": "adaptive", "tolerance": 1e-3}
+    rods = each_line(bridle(time={"duration": 4.0, "step": 0.0125}, accuracy=None), mesh=150)  # all that bends is rod
+    result, fine = hybrid.run(scene), hybrid.run(rods)
+    tow = result.lines["tow"]
     assert {zone.kind for zones in tow.zones for zone in zones} == {"rod", "catenary"}
     for quantity in ("position", "curvature", "bending_moment"):
         wrong = tow[quantity] - fine.lines["tow"][quantity]
@@ -229,9 +217,7 @@ def test_quantities_of_lines_have_errors_of_all_steps(more: dict[str, Any]) -> N
     scene["time"] = {"duration": 2.0, "step": 0.1}
     scene["lines"]["hose"] = {"start": "float", "end": "vessel", "sections": [LEG_ESTIMATED], "mesh": {"cells": 20}}
     truth = copy.deepcopy(scene) | {"accuracy": None, "time": {"duration": 2.0, "step": 0.025}}
-    for line in truth["lines"].values():
-        line["mesh"] = {"cells": 60}
-    result, fine = hybrid.run(scene), hybrid.run(truth)
+    result, fine = hybrid.run(scene), hybrid.run(each_line(truth, mesh=60))
     (lift,) = result.verdicts().quantities
     assert (lift.verdict, lift.why) == ("within", "")
     off = abs(result["extremes/lift"][1] - fine["extremes/lift"][1])

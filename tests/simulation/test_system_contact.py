@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hybrid
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 WIDTH, RUBS = 0.02, {"self": True, "friction": 0.3}
 HOSE = {
@@ -32,24 +31,15 @@ def network(**more: Any) -> dict[str, Any]:
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("contact") / "whole.h5"
-    hybrid.run(network(), path, progress=False).close()
-    return path
-
-
-def test_a_line_touches_itself_as_one_cable_does(whole: Path) -> None:
+def test_a_line_touches_itself_as_one_cable_does() -> None:
     """The same as a rod and a catenary of one cable, whose joint is the free point."""
     cells = [*np.linspace(0.0, 4.0, 81), 4.1, 4.2, 4.3, 4.4, 4.5]
-    alone = hybrid.run({
-        "cable": {"sections": [HOSE, TAIL]}, "contact": RUBS, "initial": "equilibrium",
-        "model": {"zones": [{"rod": 4.0}, {"catenary": 0.5}]}, "mesh": {"nodes": [float(x) for x in cells]},
-        "ends": {"start": {"kind": "pinned", "position": LOW, "motion": CLOSER},
-                 "end": {"kind": "pinned", "position": HIGH}},
-        "time": TIME, "output": OUTPUT | {"points": 91}, "dimension": 3,
-    }, progress=False)  # fmt: skip
-    with hybrid.open(whole) as result:
+    alone = hybrid.run(cable_scene(
+        [HOSE, TAIL], pinned_at(*LOW, motion=CLOSER), pinned_at(*HIGH), contact=RUBS, time=TIME, dimension=3,
+        model={"zones": [{"rod": 4.0}, {"catenary": 0.5}]}, mesh={"nodes": [float(x) for x in cells]},
+        output=OUTPUT | {"points": 91}
+    ), progress=False)  # fmt: skip
+    with hybrid.run(network()) as result:
         hose = result.lines["hose"]
         assert {"line touches itself"} <= {event.kind for event in hose.events}
         assert "line meets itself" not in {event.kind for event in hose.events}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from test_payout_zones import touching
 import hybrid
 from hybrid.errors import SceneError
 from tests.combinations.pairs import as_network, scene_of
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene
 
 G = 9.81
 
@@ -146,11 +145,7 @@ def to_a_buoy(rate: float = 0.8) -> Tables:
 
 
 def test_beside_a_buoy_they_move_as_rods() -> None:
-    scene = to_a_buoy()
-    rods = deepcopy(scene)
-    for line in rods["lines"].values():
-        line["model"] = "rod"
-    found, like = hybrid.run(scene), hybrid.run(rods)
+    found, like = hybrid.run(to_a_buoy()), hybrid.run(each_line(to_a_buoy(), model="rod"))
     assert all(any(z.kind == "catenary" for z in x.zones[-1]) for x in found.lines.values())
     assert found.lines["cable"]["payout/length"][-1] > 104.0
     for name, line in like.lines.items():
@@ -163,11 +158,7 @@ def test_beside_a_buoy_they_move_as_rods() -> None:
 def test_loads_that_change_on_the_way(tmp_path: Path) -> None:
     """Another current from the middle on, as with rods."""
     pulls = []
-    for k, model in enumerate(("adaptive", "rod")):
-        scene = to_a_buoy()
-        if model == "rod":
-            for line in scene["lines"].values():
-                line["model"] = "rod"
+    for k, scene in enumerate((to_a_buoy(), each_line(to_a_buoy(), model="rod"))):
         path = tmp_path / f"{k}.h5"
         hybrid.run(scene | {"time": {"duration": 4.0, "step": 0.05}}, output=path)
         found = hybrid.resume(path, until=8.0, settings=["environment.fluid.current=[0.1, 0.6, 0]"])

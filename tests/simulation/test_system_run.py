@@ -17,6 +17,7 @@ from hybrid.kernels.state import books
 from hybrid.model.plan import SAME_STOP, falls_on
 from hybrid.simulation import progress, run_line
 from hybrid.simulation import run as run_module
+from tests.inside import calls_of
 from tests.scenes import line_between, network_scene
 
 TIME = {"duration": 12.0, "step": 0.05}
@@ -156,25 +157,18 @@ def test_end_forces_of_a_damped_rod_do_not_depend_on_which_line_carries_the_poin
 
 ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}
 HEAVE = {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4}
-MEETING = {
-    "points": {
-        "west": {"position": [-60, 0, -50]},
-        "east": {"position": [60, 5, -50], "motion": HEAVE},
-        "float": {"initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2},
-    },
-    "lines": {
-        "first": {"start": "west", "end": "float", "sections": [ROPE | {"length": 75}], "mesh": {"cells": 12}},
-        "last": {"start": "float", "end": "east", "sections": [ROPE | {"length": 75}], "mesh": {"cells": 12}},
-    },
-}
+LEG = ROPE | {"length": 75}
+MEETING = network_scene(
+    {"west": {"position": [-60, 0, -50]}, "east": {"position": [60, 5, -50], "motion": HEAVE},
+     "float": {"initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2}},
+    {"first": line_between("west", "float", LEG, mesh=12), "last": line_between("float", "east", LEG, mesh=12)},
+)  # fmt: skip
 # With a motion of its own that is gentler, and an anchor that moves too.
-ALONE = {
-    "points": {
-        "anchor": {"position": [0, 100, -50], "motion": {"sway": {"amplitude": 0.4, "period": 3.0}, "ramp": 3}},
-        "ship": {"position": [40, 100, 0], "motion": HEAVE},
-    },
-    "lines": {"middle": {"start": "anchor", "end": "ship", "sections": [ROPE | {"length": 70}], "mesh": {"cells": 15}}},
-}
+ALONE = network_scene(
+    {"anchor": {"position": [0, 100, -50], "motion": {"sway": {"amplitude": 0.4, "period": 3.0}, "ramp": 3}},
+     "ship": {"position": [40, 100, 0], "motion": HEAVE}},
+    {"middle": line_between("anchor", "ship", ROPE | {"length": 70}, mesh=15)},
+)  # fmt: skip
 
 
 def scene(*parts: dict[str, Any], **tables: Any) -> dict[str, Any]:
@@ -283,18 +277,12 @@ def test_bodies_are_moved_and_loaded_in_compiled_steps(
     scene: dict[str, Any], body: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As where Python moves and loads them, and stirs the water around their members, before every try."""
-    prepared: list[float] = []
-    prepare, attach = run_module.Run._prepare, run_module.Run._attach
-
-    def note(run: Any, t: float) -> None:
-        prepared.append(t)
-        prepare(run, t)
+    attach, prepared = run_module.Run._attach, calls_of(monkeypatch, run_module.Run, "_prepare")
 
     def ask(run: Any) -> None:
         attach(run)
         run.loop.counts.asks |= books.ASK_BEFORE
 
-    monkeypatch.setattr(run_module.Run, "_prepare", note)
     compiled = hybrid.run(scene)
     assert not prepared
     monkeypatch.setattr(run_module.Run, "_attach", ask)
@@ -342,21 +330,13 @@ def test_many_times_are_not_all_read_at_every_stop() -> None:
 
 
 FLYING = {"kind": "straight", "direction": [1, 0, 0], "velocity": [1.0, 2.0, 0.5]}
-JOINED_IN_FLIGHT: dict[str, Any] = {
-    "environment": {"gravity": 9.81},
-    "points": {name: {"kind": "free", "initial_guess": [x, 0, 0]} for name, x in (("a", 0), ("knot", 5), ("b", 10))},
-    "lines": {
-        name: {
-            "start": start,
-            "end": end,
-            "sections": [{"length": 5.0, "mass": 1.0, "bending_stiffness": 10.0, "axial_stiffness": 1e5}],
-            "initial": FLYING,
-            "mesh": {"cells": 10},
-        }
-        for name, start, end in (("one", "a", "knot"), ("two", "knot", "b"))
-    },
-    "time": {"duration": 1.0, "step": 0.01},
-}
+LIGHT = {"length": 5.0, "mass": 1.0, "bending_stiffness": 10.0, "axial_stiffness": 1e5}
+JOINED_IN_FLIGHT = network_scene(
+    {name: {"kind": "free", "initial_guess": [x, 0, 0]} for name, x in (("a", 0), ("knot", 5), ("b", 10))},
+    {name: line_between(*ends, LIGHT, initial=FLYING, mesh=10)
+     for name, ends in {"one": ("a", "knot"), "two": ("knot", "b")}.items()},
+    gravity=9.81, time=(1.0, 0.01),
+)  # fmt: skip
 
 
 def test_joined_lines_that_begin_with_one_velocity_fly_together() -> None:

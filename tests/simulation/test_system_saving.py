@@ -14,7 +14,7 @@ import hybrid.simulation.run_record
 import hybrid.simulation.stepped
 import hybrid.store.writer
 from hybrid.errors import Outcome
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene
 
 # --- A run of several lines that was stopped, however often, is the run that was not: bit for bit ---
 
@@ -139,9 +139,7 @@ def scene(**tables: Any) -> dict[str, Any]:
     data = mooring(**tables)
     data["points"]["vessel"] = {"position": VESSEL.tolist()}
     data["points"]["float"]["force"] = {"value": [200, 0, 0], "until": 0.31}
-    for line in data["lines"].values():
-        line["mesh"] = {"cells": 12}
-    return data | {"time": {"duration": 1.0, "step": STEP}, "output": {"every": 0.1}}
+    return each_line(data, mesh=12) | {"time": {"duration": 1.0, "step": STEP}, "output": {"every": 0.1}}
 
 
 def heave(t: float, scale: float = 1.0) -> tuple[Any, Any]:

@@ -19,8 +19,9 @@ from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_steps import NetworkSteps
 from tests.combinations.pairs import as_network
+from tests.inside import calls_of
 from tests.said import ONE, both_ways, line_of, said
-from tests.scenes import cable_scene, network_scene, pinned_at
+from tests.scenes import cable_scene, each_line, network_scene, pinned_at
 from tests.validation.test_validation_lines_contact import force_between, lowered
 
 ROPE = {
@@ -56,10 +57,8 @@ def mooring(**more: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def three(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
-    path = tmp_path_factory.mktemp("zones") / "three.h5"
-    hybrid.run(mooring(), path).close()
-    return hybrid.open(path)
+def three() -> hybrid.Result:
+    return hybrid.run(mooring())
 
 
 def changes(result: hybrid.Result) -> list[tuple[float, float, float, str]]:
@@ -132,10 +131,7 @@ def test_ranges_of_named_quantities_go_on_through_changes(three: hybrid.Result) 
 
 
 def test_against_rods(three: hybrid.Result) -> None:
-    scene = mooring()
-    for line in scene["lines"].values():
-        line["model"] = "rod"
-    rods = hybrid.run(scene)
+    rods = hybrid.run(each_line(mooring(), model="rod"))
     for name, line in three.lines.items():
         assert np.abs(line.position - rods.lines[name].position).max() < 0.005 * 60.0, name
     there, here = (x["points/float/position"] for x in (rods, three))
@@ -176,10 +172,8 @@ def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
     result = hybrid.run(short, criterion=lambda look: np.full(look.s.size, 1.5 * (look.line == "north")))
     kinds = {name: {x.kind for x in line.zones[-1]} for name, line in result.lines.items()}
     assert kinds["north"] == {"rod"} and "catenary" in kinds["east"] & kinds["south"]
-    for line in short["lines"].values():
-        line["model"] = "rod"
     with pytest.raises(TypeError, match="not adaptive"):
-        hybrid.run(short, criterion=lambda look: look.s)
+        hybrid.run(each_line(short, model="rod"), criterion=lambda look: look.s)
 
 
 @pytest.mark.long
@@ -190,9 +184,7 @@ def test_a_resumed_run_asks_the_same_criterion(tmp_path: Path, monkeypatch: pyte
     hybrid.run(scene, whole, criterion=asks_for_the_middle, progress=stopping).close()
     assert went_on(scene, path, stopping, [stopping.heard // 2], criterion=asks_for_the_middle) == 1
     assert differences(whole, path) == []
-    stopping.left = stopping.heard // 4
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene, path, criterion=asks_for_the_middle, progress=stopping)
+    stopping.stop(stopping.heard // 4, hybrid.run, scene, path, criterion=asks_for_the_middle)
     with pytest.raises(hybrid.ResultError, match="criterion"):
         hybrid.resume(path)
 
@@ -206,12 +198,29 @@ TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 FOLLOWS = {"kind": "adaptive", "curvature_error": SHARE}
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("model", [{"hold_time": 0.1}, {"hold_time": 0.1, "curvature_error": 0.05}], ids=["zones", "cells"])
+def test_steps_that_follow_the_motion_go_by_zones_and_not_by_pauses(model: Tables, monkeypatch: Any) -> None:
+    """A review that lets rods go bounds the next step at once, and not when Python has looked."""
+    rope = {"length": 60.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
+    points = {"a": {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 2.0, "period": 2.0}, "ramp": 1.0}}}
+    line = {"start": "a", "end": "b", "mesh": {"cells": 20}, "model": {"kind": "adaptive", "tolerance": 1e-3} | model}
+    line |= {"sections": [rope | {"drag": {"normal": 1.2}}], "contact": {"self": False}}
+    scene = network_scene(
+        points | {"b": {"position": [40, 0, 0]}}, {"rope": line}, fluid={"density": 1025},
+        time={"duration": 4.0, "step": 0.04, "tolerance": 1e-3}, output={"every": 0.1},
+    )  # fmt: skip
+    found = []
+    for _ in range(2):
+        with hybrid.run(scene) as result:
+            found.append(result.lines["rope"].steps.t)
+        monkeypatch.setattr("hybrid.solve.network_steps.CELL_STEPS", 1)  # a step a call
+    assert np.array_equal(*found)
+
+
 def followed(**more: Any) -> Tables:
     """Three ropes to a weight, whose cells follow the curvature."""
-    scene = mooring(**more)
-    for line in scene["lines"].values():
-        line["model"] = FOLLOWS
-    return scene
+    return each_line(mooring(**more), model=FOLLOWS)
 
 
 def cells(line: hybrid.Result) -> list[int]:
@@ -227,8 +236,7 @@ def test_cells_change_without_python_as_with_it(model: Tables, monkeypatch: pyte
     tables = yaml.safe_load(TOUCHDOWN.read_text()) | {
         "model": model, "mesh": {"cells": 24}, "time": {"duration": 8.0, "step": 0.1}, "output": {"every": 0.1},
     }  # fmt: skip
-    calls, go = [], NetworkSteps.go
-    monkeypatch.setattr(NetworkSteps, "go", lambda steps: (calls.append(1), go(steps))[1])
+    calls = calls_of(monkeypatch, NetworkSteps, "go")
     whole = hybrid.run(said(tables, network=True))
     line, compiled = line_of(whole), len(calls)
     monkeypatch.setattr(CellChanges, "may_change", lambda run, number, switching: False)
@@ -298,8 +306,7 @@ def test_cells_of_joined_lines_change_in_arrays_of_their_own_as_with_a_new_solve
     """
     scene = make()
     scene = scene | {"time": {"duration": 6.0, "step": 0.02}, "output": {"every": 0.1}}
-    solvers, change = [], RunOfLines.go_on_changed
-    monkeypatch.setattr(RunOfLines, "go_on_changed", lambda *args: (solvers.append(1), change(*args))[1])
+    solvers = calls_of(monkeypatch, RunOfLines, "go_on_changed")
     found = hybrid.run(scene)
     assert not solvers
     for changes in (CellChanges, NodeChanges):
@@ -317,12 +324,8 @@ def test_cells_of_joined_lines_change_in_arrays_of_their_own_as_with_a_new_solve
 @pytest.mark.long
 def test_lines_that_touch_with_friction() -> None:
     """Cells become short where ropes cross as they come down onto each other; these rub and roll as fine rods do."""
-    fine, follow = lowered(), lowered()
-    for line in fine["lines"].values():
-        line["mesh"] = {"cells": 160}
-    for line in follow["lines"].values():
-        line |= {"mesh": {"cells": 20}, "model": {"kind": "adaptive", "curvature_error": 0.02}}
-    rods, found = hybrid.run(fine), hybrid.run(follow)
+    follow = each_line(lowered(), mesh=20, model={"kind": "adaptive", "curvature_error": 0.02})
+    rods, found = hybrid.run(each_line(lowered(), mesh=160)), hybrid.run(follow)
     for name, line in found.lines.items():
         like = rods.lines[name]
         assert np.abs(line.position - like.position).max() < 1e-3 and len({*cells(line)}) > 2
@@ -344,15 +347,11 @@ def test_clamped_to_what_turns(held: str) -> None:
 
 @pytest.mark.long
 def test_with_an_accuracy_the_error_that_is_said_holds() -> None:
-    scene = mooring(accuracy={"position": "5 cm", "tension": "2%"}, time={"duration": 2.0})
+    scene = followed(accuracy={"position": "5 cm", "tension": "2%"}, time={"duration": 2.0})
     for line in scene["lines"].values():
-        line |= {"model": FOLLOWS}
         line.pop("mesh")
     found = hybrid.run(scene)
-    fine = mooring(time={"duration": 2.0, "step": 0.005})
-    for line in fine["lines"].values():
-        line |= {"model": "rod", "mesh": {"cells": 240}}
-    rods = hybrid.run(fine)
+    rods = hybrid.run(each_line(mooring(time={"duration": 2.0, "step": 0.005}), model="rod", mesh=240))
     for name, line in found.lines.items():
         off = np.linalg.norm(line.position - rods.lines[name].position, axis=2).max()
         said = line["errors/total/position"].max()

@@ -110,8 +110,8 @@ def test_cells_that_follow_the_curvature_carry_it():
 # --- torques that are saved ---
 
 
-@pytest.fixture(scope="module")
-def simulation():
+def test_answers_serve_for_steps_of_the_same_length():
+    """Round-off of the times of steps is no other length: answers were found anew in every step."""
     section = {"length": 6.0, "mass": 0.6, "diameter": 0.02, "bending_stiffness": 10.0, "torsional_stiffness": 8.0}
     sway = {"motion": {"sway": {"amplitude": 0.5, "period": 4.0}, "ramp": 1.0}}
     clamp = {"kind": "clamped", "normal": [0, 1, 0]}
@@ -122,20 +122,11 @@ def simulation():
         model={"kind": "zones",
                "zones": [{"rod": 1.5, "cells": 6}, {"catenary": 3, "cells": 12}, {"rod": 1.5, "cells": 6}]}
     ))  # fmt: skip
-    return hybrid.Simulation(scene)
-
-
-def answers(simulation):
-    return OnlyLine(simulation).work.torsion
-
-
-def test_answers_serve_for_steps_of_the_same_length(simulation):
-    """Round-off of the times of steps is no other length: answers were found anew in every step."""
+    simulation, served = hybrid.Simulation(scene), []
     simulation.advance(0.5)
-    served = []
     for _ in range(12):
         simulation.advance(simulation.t + 0.01)
-        served.append(int(answers(simulation).known[1]))
+        served.append(int(OnlyLine(simulation).work.torsion.known[1]))
     assert max(served) > 10, f"iterations that answers served: {served}"
 
 

@@ -31,16 +31,8 @@ def clamped(place, **more):
 
 def taut(first=None, second=None, section=None, **more) -> hybrid.Scene:
     """A rod along x without weight, pulled by 5 N; first, second: more of its ends."""
-    return hybrid.validate_scene(
-        {
-            "environment": {"gravity": 0.0},
-            "cable": {"sections": [SECTION | (section or {})]},
-            "ends": {"start": clamped([0, 0, 0], **(first or {})), "end": clamped([100.05, 0, 0], **(second or {}))},
-            "initial": "equilibrium",
-            "model": "rod",
-            **more,
-        }
-    )
+    ends = clamped([0, 0, 0], **(first or {})), clamped([100.05, 0, 0], **(second or {}))
+    return hybrid.validate_scene(cable_scene(SECTION | (section or {}), *ends, gravity=0.0, model="rod") | more)
 
 
 def torque_of(turns: float) -> float:
@@ -128,9 +120,9 @@ def test_a_run_starts_with_the_turns():
 # --- motion --------------------------------------------------------------------------------------
 
 
-def wound(folder: Path, turns: float, over: float, until: float) -> dict:
-    """Motion of an end that is turned about x."""
-    t = np.arange(0.0, until + 1.0, 2.0)
+def wound(folder: Path, turns: float, over: float, until: float, every: float = 2.0) -> dict:
+    """Motion of an end that is turned about its tangent."""
+    t = np.arange(0.0, until + 0.5 * every, every)
     x = np.clip(t / over, 0.0, 1.0)
     angle = 360.0 * turns * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
     table = np.column_stack([t, angle, 0 * t, 0 * t])
@@ -229,14 +221,9 @@ def line(swivel: bool, normal: tuple[float, float, float] = (0.0, 1.0, 0.0), mod
 
 def turning(turns: float, folder: Path, swivel: bool = True, model: Any = "rod") -> hybrid.Result:
     """The first clamp turns about its tangent within 8 s, then rests for 4 s."""
-    t = np.linspace(0.0, 12.0, 49)
-    x = np.clip(t / 8.0, 0.0, 1.0)
-    angle = 360.0 * turns * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-    path = folder / "turns.csv"
-    np.savetxt(path, np.column_stack([t, angle, 0 * t, 0 * t]), delimiter=",", header="t,rx,ry,rz", comments="")
     scene = line(swivel, model=model) | {"time": {"duration": 12.0, "step": 0.02}}
     scene["output"] = {"every": 0.5, "points": 41}
-    scene["ends"]["start"]["motion"] = {"file": str(path)}
+    scene["ends"]["start"] |= wound(folder, turns, 8.0, 12.0, 0.25)
     return hybrid.run(scene)
 
 
@@ -265,14 +252,10 @@ def test_a_swivel_end_that_bends_the_line_feels_no_turns(turns: float, tmp_path:
     """A rod bent by an askew clamp with a swivel: turned by its other end, it lies as before, whatever the turns."""
     results = []
     for n in (0.0, turns):
-        t = np.linspace(0.0, 10.0, 21)
-        x = np.clip(t / 8.0, 0.0, 1.0)
-        path, angle = tmp_path / "turns.csv", 360.0 * n * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-        np.savetxt(path, np.column_stack([t, angle, 0 * t, 0 * t]), delimiter=",", header="t,rx,ry,rz", comments="")
         scene = cable_scene(
             {"length": 1.0, "mass": 1.0, "bending_stiffness": 1.0, "torsional_stiffness": 0.8,
              "damping": {"mass": 20.0}},
-            clamped_at([0.0] * 3, [1.0, 0.0, 0.0], normal=[0.0, 0.0, 1.0], motion={"file": str(path)}),
+            clamped_at([0.0] * 3, [1.0, 0.0, 0.0], normal=[0.0, 0.0, 1.0], **wound(tmp_path, n, 8.0, 10.0, 0.5)),
             clamped_at([0.8, 0.0, 0.0], [0.8, 0.6, 0.0], swivel=True), gravity=0.0, model="rod", mesh=40,
             time=(10.0, 0.02), output=(1.0, 21)
         )  # fmt: skip

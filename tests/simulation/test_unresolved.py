@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from problems import pinned, scene
 
 import hybrid
@@ -20,29 +21,24 @@ from hybrid.scene.read import one_line
 from hybrid.simulation.diagnostics import Diagnostics
 from hybrid.simulation.events import EventLog, kinks_at
 from hybrid.store.verdicts import MET, verdicts_of
-from tests.scenes import cable_scene, pinned_at
+from tests.said import kinds, of_kind, texts_of
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene, pinned_at
 
-KIND = "kink at joint"
+KINK = "kink at joint"
 
 
 def sagging(border: float, **more: Any) -> dict[str, Any]:
     """A cable of 20 m over 8 m, a stiff rod to the border and a catenary from there on."""
     section = {"length": 20.0, "mass": 1.0, "bending_stiffness": 20.0}
-    ends = {"start": pinned_at(0, 0, 0), "end": pinned_at(8, 0, 0)}
     zones = {"kind": "zones", "zones": [{"rod": border}, {"catenary": 20.0 - border}]}
-    tables = {"cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": zones}
-    return tables | {"mesh": {"cells": 80}} | more
-
-
-def kinks(result: hybrid.Result) -> list[Any]:
-    return [event for event in result.events if event.kind == KIND]
+    return cable_scene(section, pinned_at(0, 0, 0), pinned_at(8, 0, 0), model=zones, mesh=80) | more
 
 
 def test_a_border_in_the_sag_is_said_with_place_angle_and_remedy() -> None:
-    (said,) = kinks(hybrid.static(sagging(10.0)))
+    (said,) = of_kind(hybrid.static(sagging(10.0)), KINK)
     assert said.s_a == said.s_b == pytest.approx(10.0)
     assert "s = 10 m" in said.text and "model.zones" in said.text and "model: rod" in said.text
-    assert not kinks(hybrid.static(sagging(16.0)))
+    assert not of_kind(hybrid.static(sagging(16.0)), KINK)
 
 
 def test_a_run_says_it_when_it_comes() -> None:
@@ -53,7 +49,7 @@ def test_a_run_says_it_when_it_comes() -> None:
     time = {"duration": 20.0, "step": 0.05}
     section = {"length": 20.0, "mass": 1.0, "bending_stiffness": 20.0, "damping": 2.0, "axial_stiffness": 1e5}
     run = hybrid.run(sagging(10.0, ends=ends, time=time, cable={"sections": [section]}))
-    said = kinks(run)
+    said = of_kind(run, KINK)
     assert said and said[0].t > 0.0 and said[0].s_a == pytest.approx(10.0)
 
 
@@ -61,7 +57,7 @@ def test_zones_that_move_say_it_too() -> None:
     """Where a scene forces the border into the sag, at any output."""
     model = {"kind": "adaptive", "force_rod": [[0, 10]], "force_catenary": [[10, 20]]}
     time = {"duration": 0.2, "step": 0.05}
-    said = kinks(hybrid.run(sagging(10.0, model=model, time=time)))
+    said = of_kind(hybrid.run(sagging(10.0, model=model, time=time)), KINK)
     assert said and said[0].s_a == pytest.approx(10.0) and "model.force_catenary" in said[0].text
 
 
@@ -69,7 +65,7 @@ def test_a_point_load_at_the_joint_is_no_kink_of_zones() -> None:
     clump = {"kind": "clump", "at": 10.0, "mass": 30.0}
     loaded = sagging(10.0)
     loaded["cable"]["attachments"] = [clump]
-    assert not kinks(hybrid.static(loaded))
+    assert not of_kind(hybrid.static(loaded), KINK)
 
 
 def test_what_bends_beside_a_joint_is_taken_off() -> None:
@@ -95,23 +91,16 @@ def laid(cells: int, **more: Any) -> dict[str, Any]:
         "length": 240, "diameter": DIAMETER, "mass": 1.5, "axial_stiffness": 2e7, "bending_stiffness": EI,
         "drag": {"normal": 1.2},
     }  # fmt: skip
-    return {
-        "environment": sea, "cable": {"sections": [section]}, "ends": ENDS, "dimension": 2, "initial": "equilibrium",
-        "model": "rod", "time": {"duration": 0.2, "step": 0.05}, "mesh": {"cells": cells},
-    } | more  # fmt: skip
-
-
-def noted(result: hybrid.Result) -> list[Any]:
-    return [event for event in result.events if event.kind == SLACK_BEND]
+    return cable_scene(section, **ENDS, **sea, dimension=2, model="rod", time=(0.2, 0.05), mesh=cells) | more
 
 
 def test_a_rod_on_cells_longer_than_its_bend(tmp_path: Path) -> None:
     coarse = hybrid.run(laid(30), tmp_path / "coarse.h5")
-    [event] = noted(coarse)
+    [event] = of_kind(coarse, SLACK_BEND)
     assert f"within {BEND:.2g} m" in event.text and "a cell of 8 m" in event.text
     assert f"cells of {0.25 * BEND:.2g} m would do" in event.text
     fine = hybrid.run(laid(400), tmp_path / "fine.h5")
-    assert not noted(fine)
+    assert not of_kind(fine, SLACK_BEND)
     bends = [float(x["curvature"][0].max()) for x in (coarse, fine)]
     assert bends[0] < 0.5 * bends[1]  # what the event is about
     s = fine.s[np.argmax(fine["curvature"][0])]
@@ -126,19 +115,19 @@ def test_cells_as_the_text_asks_for_show_the_bend(tmp_path: Path) -> None:
 
 def test_accuracy_of_curvature_is_a_remedy(tmp_path: Path) -> None:
     scene = {key: value for key, value in laid(30).items() if key != "mesh"}
-    assert noted(hybrid.run(scene, tmp_path / "plain.h5"))
-    assert not noted(hybrid.run(scene | {"accuracy": {"curvature": "5%"}}, tmp_path / "asked.h5"))
+    assert of_kind(hybrid.run(scene, tmp_path / "plain.h5"), SLACK_BEND)
+    assert not of_kind(hybrid.run(scene | {"accuracy": {"curvature": "5%"}}, tmp_path / "asked.h5"), SLACK_BEND)
 
 
 def test_cells_that_follow_are_looked_at_too(tmp_path: Path) -> None:
     model = {"kind": "adaptive", "curvature_error": 0.1, "rod_cell": 6.0}
-    [event] = noted(hybrid.run(laid(30, model=model), tmp_path / "follow.h5"))
+    [event] = of_kind(hybrid.run(laid(30, model=model), tmp_path / "follow.h5"), SLACK_BEND)
     assert "`model.rod_cell`" in event.text
 
 
 def test_it_is_noted_once_and_not_again_after_a_resume(tmp_path: Path) -> None:
     hybrid.run(laid(30), tmp_path / "half.h5")
-    assert len(noted(hybrid.resume(tmp_path / "half.h5", until=0.4))) == 1
+    assert len(of_kind(hybrid.resume(tmp_path / "half.h5", until=0.4), SLACK_BEND)) == 1
 
 
 @pytest.mark.parametrize("change", ["taut", "straight", "natural"])
@@ -159,7 +148,7 @@ def test_what_is_shown_is_not_noted(change: str, tmp_path: Path) -> None:
         clamp = {"kind": "clamped", "position": [0, 0, -60], "tangent": [1, 0, 0], "normal": [0, 0, 1]}
         scene |= {"ends": {"start": clamp, "end": "free"}, "mesh": {"cells": 15}, "dimension": 3}
     result = hybrid.run(scene, tmp_path / "a.h5")
-    assert not noted(result)
+    assert not of_kind(result, SLACK_BEND)
     if change == "natural":  # it is bent, by 0.2 rad a cell, and without tension
         assert result["curvature"][0].max() == pytest.approx(0.05, rel=0.05)
 
@@ -176,8 +165,7 @@ def described(first: float = SOFT, second: float = STIFF, **more: Any) -> dict[s
         {"length": HALF, "mass": MASS, "diameter": 0.007, "bending_stiffness": EI, "axial_stiffness": 4e5}
         for EI in (first, second)
     ]
-    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [ACROSS, 0, 0]}}
-    return {"cable": {"sections": sections}, "ends": ends, "initial": "equilibrium"} | more
+    return cable_scene(sections, pinned_at(0, 0, 0), pinned_at(ACROSS, 0, 0)) | more
 
 
 def exact(tension: float) -> float:
@@ -265,21 +253,13 @@ SECTION = {"length": 10.0, "mass": 5.0, "axial_stiffness": 1e7, "bending_stiffne
 def column(weight_down: bool) -> dict:
     """A rod that stands on a clamp, or hangs from it, under its own weight of 491 N."""
     way = 1.0 if weight_down else -1.0
-    return {
-        "cable": {"sections": [SECTION]},
-        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, way]}, "end": "free"},
-        "initial": {"kind": "equilibrium", "points": [[0, 0, 0], [0, 0, way * 10.0]]},
-        "model": "rod",
-    }
-
-
-def said(result: hybrid.Result) -> list[str]:
-    return [event.text for event in result.events if event.kind == "compression"]
+    initial = {"kind": "equilibrium", "points": [[0, 0, 0], [0, 0, way * 10.0]]}
+    return cable_scene(SECTION, clamped_at([0, 0, 0], [0, 0, way]), "free", initial=initial, model="rod")
 
 
 def test_a_rod_that_stands_is_in_compression() -> None:
     found = hybrid.static(column(True))
-    (text,) = said(found)
+    (text,) = texts_of(found, "compression")
     assert found.tension.min() == pytest.approx(-5.0 * 9.81 * 10.0, rel=0.02)
     (event,) = [x for x in found.events if x.kind == "compression"]
     assert event.s_a == 0.0 and event.s_b == pytest.approx(10.0)
@@ -287,7 +267,7 @@ def test_a_rod_that_stands_is_in_compression() -> None:
 
 
 def test_one_that_hangs_is_not() -> None:
-    assert not said(hybrid.static(column(False)))
+    assert not texts_of(hybrid.static(column(False)), "compression")
 
 
 @pytest.mark.long
@@ -378,15 +358,10 @@ def test_steps_that_are_watched_go_on_from_a_checkpoint(tmp_path: Path) -> None:
     """What is remembered of steps for the end of the run is in the checkpoint: the same event, whenever it stopped."""
     section = {"length": 30, "mass": 2, "axial_stiffness": 1e6}
     moved = {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 0.3, "period": 2}, "ramp": 2}}
-    line = {"start": "a", "end": "b", "sections": [section], "model": "catenary", "mesh": {"cells": 12}}
-    more = {"time": {"duration": 6, "step": 0.25}}
-    scene = {"points": {"a": moved, "b": {"position": [20, 0, 0]}}, "lines": {"line": line}}
-    whole = hybrid.run(scene | more)
-    short = {"time": more["time"] | {"duration": 4}}
-    hybrid.run(scene | short, tmp_path / "a.h5")
-    resumed = hybrid.resume(tmp_path / "a.h5", until=6)
-    events = [[(x.t, x.text) for x in r.lines["line"].events if x.kind == "coarse step"] for r in (whole, resumed)]
-    assert events[0] and events[1][-1] == events[0][-1]
+    line = line_between("a", "b", section, model="catenary", mesh=12)
+    points = {"a": moved, "b": {"position": [20, 0, 0]}}
+    whole = resumed(network_scene(points, {"line": line}, time=(6.0, 0.25), output=0.25), tmp_path, 4.0)
+    assert "coarse step" in kinds(whole.lines["line"])
 
 
 def test_what_a_kernel_writes_into_a_table_it_does_not_read_there() -> None:

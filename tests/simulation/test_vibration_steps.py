@@ -25,7 +25,7 @@ from hybrid.simulation.events import EventLog
 from hybrid.simulation.run_steps import VibrationsOfLines, VibrationSteps
 from hybrid.simulation.watches import FIRST_MOMENTS, GAIN_NOTED, SchemeWatch
 from tests.said import line_of, said
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene, pinned_at
 
 PERIOD = 4.0 * 12.0 * (2.0 / 1e5) ** 0.5
 
@@ -154,32 +154,19 @@ def test_a_stopped_run_goes_on_bit_for_bit(tmp_path, monkeypatch):
 def cantilever(**more):
     """56 Hz, shaken with 20 Hz: the forced motion is of order 2, and hides what its ramp leaves."""
     motion = {"heave": {"amplitude": 0.01, "period": 0.05}, "ramp": 0.1}
-    return {
-        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "bending_stiffness": 1e4}]},
-        "ends": {
-            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "motion": motion},
-            "end": "free",
-        },
-        "initial": "equilibrium",
-        "time": {"duration": 1.0},
-        "output": {"every": 0.01, "points": 26},
-    } | more
+    section, start = (
+        {"length": 1.0, "mass": 1.0, "bending_stiffness": 1e4},
+        clamped_at([0, 0, 0], [1, 0, 0], motion=motion),
+    )
+    return cable_scene(section, start, "free", time=1.0, output=(0.01, 26)) | more
 
 
 def taut(**more):
     """Of 10 m, pulled by 100 N, 1 kg/m: waves of 10 m/s."""
     travel = {"travel": {"by": [0, 0, 0.1], "over": 1.5, "begin": 0.2}}
-    return {
-        "environment": {"gravity": 0},
-        "cable": {"sections": [{"length": 10.0 / 1.01, "mass": 1.01, "axial_stiffness": 1e4}]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [10, 0, 0], "motion": travel},
-        },
-        "initial": "equilibrium",
-        "model": "catenary",
-        "time": {"duration": 10.0},
-    } | more
+    section = {"length": 10.0 / 1.01, "mass": 1.01, "axial_stiffness": 1e4}
+    ends = pinned_at(0, 0, 0), pinned_at(10, 0, 0, motion=travel)
+    return cable_scene(section, *ends, gravity=0, model="catenary", time=10.0) | more
 
 
 def at_rest(scene):
@@ -244,19 +231,12 @@ def apart(tables, line=None):
 def test_what_is_foretold_is_what_steps_lose(where):
     if where == "two lines":
         section = {"length": 5.0 / 1.01, "mass": 1.01, "axial_stiffness": 1e4}
-        of_line = {"sections": [section], "model": "catenary"}
-        scene = taut()
-        tables = {
-            "environment": {"gravity": 0},
-            "points": {
-                "a": {"position": [0, 0, 0]},
-                "b": {"kind": "free", "mass": 5.0, "initial_guess": [5, 0, 0]},
-                "c": {"position": [10, 0, 0], "motion": scene["ends"]["end"]["motion"]},
-            },
-            "lines": {"one": {"start": "a", "end": "b"} | of_line, "two": {"start": "b", "end": "c"} | of_line},
-            "time": {"duration": 10.0},
-        }
-        is_, found = apart(tables, "two")
+        points = {
+            "a": {"position": [0, 0, 0]}, "b": {"kind": "free", "mass": 5.0, "initial_guess": [5, 0, 0]},
+            "c": {"position": [10, 0, 0], "motion": taut()["ends"]["end"]["motion"]},
+        }  # fmt: skip
+        lines = {name: line_between(*ends, section, model="catenary") for name, ends in (("one", "ab"), ("two", "bc"))}
+        is_, found = apart(network_scene(points, lines, gravity=0, time=10.0), "two")
         assert found.period == pytest.approx(1.0, rel=0.01)  # of the halves, on either side of the mass
     elif where == "water":
         section = {"length": 10.0 / 1.01, "mass": 1.01, "axial_stiffness": 1e4, "diameter": 0.03}

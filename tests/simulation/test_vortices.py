@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import hybrid
 from hybrid.errors import SceneError
-from tests.scenes import cable_scene, line_between, network_scene, pinned_at
+from tests.scenes import cable_scene, each_line, line_between, network_scene, pinned_at
 
 # A cylinder of 1 m: kg, N/m, m; kg/m3; coefficients of the model.
 MASS, SPRING, D, RHO, DRAG = 16.79, 1218.0, 0.1, 1000.0, 1.2
@@ -240,9 +240,7 @@ def test_a_current_pushes_with_the_drag_of_the_members() -> None:
     members = [{"start": [0, -2, 0], "end": [0, 2, 0], "diameter": 0.5, "drag": 0.9},
                {"start": [-1, 0, 0], "end": [1, 0, 0], "diameter": 0.2, "drag": 0.7, "axial_drag": 0.05}]  # fmt: skip
     made = scene({"current": [0.8, 0, 0]}, body(members=members))
-    for line in made["lines"].values():
-        line["sections"] = [HUNG]
-    with hybrid.static(made) as result:
+    with hybrid.static(each_line(made, sections=[HUNG])) as result:
         force = result["bodies/it/force"][-1]
         expected = 0.5 * RHO_MEMBER * 0.64 * (0.5 * 0.9 * 4.0 + np.pi * 0.2 * 0.05 * 2.0)
         assert -force[0] == pytest.approx(expected, rel=1e-5)
@@ -256,9 +254,7 @@ def floating(**more: Any) -> dict[str, Any]:
     given = body(**({"members": members, "centre_of_buoyancy": [0, 0, 0]} | floats | more))
     made = scene({"current": [0.8, 0, 0], "surface": 0.0}, given)
     made["points"]["west"]["position"], made["points"]["east"]["position"] = [-101, 0, -2], [101, 0, -2]
-    for line in made["lines"].values():
-        line["sections"] = [HUNG | {"drag": {"normal": 0.0}}]
-    return made
+    return each_line(made, sections=[HUNG | {"drag": {"normal": 0.0}}])
 
 
 @pytest.mark.parametrize("guess", [-6.0, -1.0, 0.0, 4.0])
@@ -329,9 +325,7 @@ def small_body(depth: float, waves: dict[str, Any], **tables: Any) -> tuple[dict
     soft = {"length": 59.0, "mass": 1e-4, "diameter": 3e-4, "axial_stiffness": 0.05, "max_strain": 0.9}
     made = scene({"surface": 0.0, "waves": {"kind": "regular", "height": 1.0, "period": 8.0} | waves}, given, **tables)
     made["points"]["west"]["position"], made["points"]["east"]["position"] = [-61, 0, -10], [61, 0, -10]
-    for line in made["lines"].values():
-        line["sections"] = [soft]
-    return made, volume
+    return each_line(made, sections=[soft]), volume
 
 
 def test_waves_carry_a_small_body_along_with_the_water() -> None:
@@ -357,9 +351,7 @@ def test_energy_of_a_swinging_body_is_balanced_to_second_order() -> None:
         given = body(force={"history": [[0, 0, 0, 0], [0.25, 3000, 500, 0], [0.5, 0, 0, 0]]}, centre=[0, 0, -0.4])
         made = scene({"current": [0.5, 0.2, 0]}, given, time={"duration": 2.0, "step": step}, output={"every": 0.5})
         made["points"]["board"]["place"] = [0.8, 0.1, 0.5]
-        for line in made["lines"].values():
-            line["sections"] = [HUNG]
-        with hybrid.run(made) as result:
+        with hybrid.run(each_line(made, sections=[HUNG])) as result:
             part = {key: result[f"bodies/it/{key}"] for key in
                     ("energy/kinetic", "energy/potential", "work/lines", "work/damping", "work/loads")}  # fmt: skip
             left = part["energy/kinetic"] + part["energy/potential"]

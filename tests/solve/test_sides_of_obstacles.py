@@ -11,6 +11,7 @@ import hybrid
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
 from hybrid.solve.stability import behind_obstacles, obstacles_left
+from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import over_pipe
 
 RADIUS, AT = 0.5, np.array([5.0, 0.0, -1.0])
@@ -73,11 +74,8 @@ ROPE = {"length": 2.2, "mass": 0.3, "diameter": 0.02, "axial_stiffness": 1e4, "b
 
 def cable(obstacle: dict[str, Any]) -> dict[str, Any]:
     """A rope between two pins as high as the top of an obstacle, begun as an arch high above it."""
-    ends = {"start": {"kind": "pinned", "position": ARCH[0]}, "end": {"kind": "pinned", "position": ARCH[-1]}}
-    return {
-        "cable": {"sections": [ROPE]}, "obstacles": {"a": obstacle}, "ends": ends, "model": "rod", "mesh": {"cells": 60},
-        "initial": {"kind": "equilibrium", "points": ARCH},
-    }  # fmt: skip
+    ends, initial = (pinned_at(*ARCH[0]), pinned_at(*ARCH[-1])), {"kind": "equilibrium", "points": ARCH}
+    return cable_scene(ROPE, *ends, obstacles={"a": obstacle}, model="rod", mesh=60, initial=initial)
 
 
 @pytest.mark.parametrize("obstacle", [PIPE, BOX], ids=["pipe", "box"])

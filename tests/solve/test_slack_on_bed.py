@@ -23,12 +23,8 @@ SPAN, WEIGHT = 100.0, 50.0 * 9.81
 def lying(length: float, bed: dict[str, Any], end: float = SPAN, **section: float) -> dict[str, Any]:
     """A line on a bed, between ends that lie on it SPAN apart, or `end`."""
     one = {"length": length, "diameter": 0.1, "mass": 50.0, "axial_stiffness": 1e8} | section
-    places = {"start": [0.0, 0.0, 0.0], "end": [end, 0.0, 0.0]}
-    return {
-        "environment": {"gravity": 9.81, "seabed": {"z": 0.0, "stiffness": 5e4} | bed},
-        "cable": {"sections": [one]}, "ends": {k: {"kind": "pinned", "position": x} for k, x in places.items()},
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 100},
-    }  # fmt: skip
+    ends, around = (pinned_at(0.0, 0.0, 0.0), pinned_at(end, 0.0, 0.0)), {"z": 0.0, "stiffness": 5e4} | bed
+    return cable_scene(one, *ends, gravity=9.81, seabed=around, model="rod", mesh=100)
 
 
 @pytest.mark.parametrize(("EI", "longer"), [(100.0, 1.001), (100.0, 1.05), (1e4, 1.01)])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.scenes import pinned_at
+from tests.scenes import cable_scene, pinned_at
 
 SEEDS = range(50)
 
@@ -34,14 +34,11 @@ def touchdown(g):
     bed = {"z": -depth, "stiffness": 10 ** g.uniform(3, 5)} | ({"friction": 0.4} if g.random() < 0.3 else {})
     lift = mass * length * g.uniform(0, 2)
     floats = [{"kind": "float", "at": length * g.uniform(0.2, 0.8), "buoyancy": lift, "drag_area": 0.3}]
-    return {
-        "environment": {"fluid": {"density": 1025, "current": two_heights(g, depth, 1.0, 0.3)}, "seabed": bed},
-        "cable": {"sections": [section], "attachments": floats if g.random() < 0.3 else []},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, -depth]},
-            "end": {"kind": "pinned", "position": [span * np.cos(1.0), span * np.sin(1.0), 0]},
-        },
-    }
+    return cable_scene(
+        section, pinned_at(0, 0, -depth), pinned_at(span * np.cos(1.0), span * np.sin(1.0), 0), initial="",
+        fluid={"density": 1025, "current": two_heights(g, depth, 1.0, 0.3)}, seabed=bed,
+        attachments=floats if g.random() < 0.3 else [],
+    )  # fmt: skip
 
 
 def tether(g):

@@ -19,7 +19,7 @@ from hybrid.scene.read import one_line
 from hybrid.simulation.run import Run, new_run
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import JoinedLine, NetworkState, joined_ends
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 LENGTH, CELLS = 100.0, 40
 A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])
@@ -29,11 +29,9 @@ WATER = {"fluid": {"density": 1025, "current": [0.3, 0.2, 0]}}
 
 def piece(kind: str, length: float, a: np.ndarray, b: np.ndarray, cells: int) -> Model:
     section = SECTION | {"length": length} | ({"bending_stiffness": 20.0} if kind == "rod" else {})
-    ends = {"start": {"kind": "pinned", "position": a.tolist()}, "end": {"kind": "pinned", "position": b.tolist()}}
-    tables: dict[str, Any] = {
-        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": kind,
-        "mesh": {"cells": cells}, "environment": WATER,
-    }  # fmt: skip
+    tables = cable_scene(
+        section, pinned_at(*a.tolist()), pinned_at(*b.tolist()), model=kind, mesh=cells, environment=WATER
+    )
     return build(one_line(hybrid.validate_scene(tables)))
 
 

@@ -20,7 +20,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.simulation import equilibrium
 from hybrid.solve.stepper import LineFailed
 from tests.combinations.pairs import seen_by
-from tests.scenes import network_scene
+from tests.scenes import each_line, network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 LEG = {"length": 10.0, "mass": 1e-3, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
@@ -89,24 +89,6 @@ def test_a_rod_that_would_buckle_is_no_equilibrium_of_a_system(load: float, heig
     assert found["points/head/position"][-1, 2] == pytest.approx(height, abs=0.01)
 
 
-def test_a_line_that_hangs_in_a_fold_says_so() -> None:
-    """A hose of 20 m between points 0.4 m apart turns within (EI/w)^(1/3) = 0.3 m; 20 cells of 1 m do not show it."""
-    hose = {"sections": [{"length": 20.0, "mass": 1.0, "bending_stiffness": 0.25}], "model": "rod"}
-    ends = {"a": {"position": [0, 0, 0]}, "b": {"position": [0.4, 0, 0]}}
-
-    def scene(cells: int) -> dict[str, Any]:
-        return {"points": ends, "lines": {"hose": hose | {"start": "a", "end": "b", "mesh": {"cells": cells}}}}
-
-    coarse, fine = hybrid.static(scene(20)), hybrid.static(scene(200))
-    (said,) = [event for event in coarse.events if event.kind == "unresolved bend"]
-    assert said.s_a == pytest.approx(10.0, abs=1.01)
-    assert "line hose" in said.text and "cells of" in said.text
-    assert folds(fine) < 0.5 * np.pi
-    assert coarse.lines["hose"].position[-1][:, 2].min() == pytest.approx(
-        fine.lines["hose"].position[-1][:, 2].min(), abs=0.3
-    )
-
-
 def test_a_slack_catenary_is_said_where_nothing_else_is_found() -> None:
     """A mooring with a leg that lies without tension on a slope, which `slack: warn` lets pass."""
     found = hybrid.static(slack_mooring())
@@ -158,11 +140,8 @@ def test_a_start_of_many_cells_is_sought_from_on_no_others(monkeypatch: pytest.M
         raise LineFailed(0, Outcome.NOT_CONVERGED, None, None)
 
     monkeypatch.setattr(equilibrium, "_on_its_side", fails)
-    scene = slack_mooring()
-    for line in scene["lines"].values():
-        line["mesh"] = {"cells": 120}
     with pytest.raises(ComputationError):
-        hybrid.static(scene)
+        hybrid.static(each_line(slack_mooring(), mesh=120))
     assert len(cells) > 5 and {a == b for pairs in cells for a, b in pairs} == {True}
     assert {a for pairs in cells for a, _ in pairs} > {120}  # fewer ones, from the first places
 

@@ -29,6 +29,7 @@ from hybrid.store.reader import open_result
 from hybrid.store.recorder import Rows
 from hybrid.store.whole_file import read_checkpoint
 from hybrid.store.writer import Recorder, WriteMode
+from tests.inside import calls_of
 from tests.scenes import line_between, network_scene
 
 WRITER = """
@@ -208,10 +209,8 @@ def content(path: Path) -> dict[str, tuple[str, list[object], list[tuple[str, st
 
 def test_the_second_file_of_the_same_datasets_is_as_the_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And as one whose values HDF5 has written."""
-    made: list[str] = []
-    create = store.Bare.create
     monkeypatch.setattr(store, "_kept", {})
-    monkeypatch.setattr(store.Bare, "create", lambda *given: made.append(given[2]) or create(*given))
+    made = calls_of(monkeypatch, store.Bare, "create")
     write(tmp_path / "first.h5")
     write(tmp_path / "second.h5")
     assert content(tmp_path / "second.h5") == content(tmp_path / "first.h5") and len(made) == 1
@@ -274,14 +273,7 @@ def test_outputs_of_lines_are_made_together(monkeypatch: pytest.MonkeyPatch) -> 
     points = {"a": {"position": [0, 0, 0]}, "b": {"position": [100, 0, 0]}}
     points["b"]["motion"] = {"heave": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0}
     scene = network_scene(points, {"l": line_between("a", "b", rope, mesh=10)}, time=(1.0, 0.05), output=(0.05, 5))
-    calls: list[int] = []
-    write_down = RunLine.write_down
-
-    def counted(line: RunLine) -> None:
-        calls.append(sum(len(batch.t) for batch in line._waiting))
-        write_down(line)
-
-    monkeypatch.setattr(RunLine, "write_down", counted)
+    calls = calls_of(monkeypatch, RunLine, "write_down", lambda line: sum(len(batch.t) for batch in line._waiting))
     found = []
     for pause in (0.0, 100.0):
         monkeypatch.setattr(writer, "pause", lambda _, pause=pause: pause)

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.cli.plan_tables import plan_rows
 from hybrid.store.capacity import formation_tension, kink_torque, pop_out, strand_distance
-from tests.scenes import cable_scene
+from tests.scenes import cable_scene, clamped_at
 
 
 def loop(m: float, s: np.ndarray) -> np.ndarray:
@@ -129,12 +129,10 @@ def test_the_plan_knows_the_bed_and_the_stretch() -> None:
     """As of the equilibrium, where that is computed: tensions of a line between clamps, part of it on the bed."""
     section = {"length": 60.0, "mass": 5.0, "diameter": 0.05, "bending_stiffness": 200.0, "axial_stiffness": 1e6,
                "torsional_stiffness": 150.0}  # fmt: skip
-    ends = {"start": {"kind": "clamped", "tangent": [1.0, 0.0, 0.0], "position": [0.0, 0.0, 0.0], "normal": [0.0, 1.0, 0.0]},
-            "end": {"kind": "clamped", "tangent": [0.3, 0.0, 1.0], "position": [40.0, 0.0, 35.0], "normal": [0.0, 1.0, 0.0]}}  # fmt: skip
-    scene = {
-        "environment": {"seabed": {"z": 0.0, "stiffness": 1e4}}, "cable": {"sections": [section]}, "ends": ends,
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 120}, "time": {"duration": 1.0, "step": 0.02},
-    }  # fmt: skip
+    y = [0.0, 1.0, 0.0]
+    ends = clamped_at([0.0] * 3, [1.0, 0.0, 0.0], normal=y), clamped_at([40.0, 0.0, 35.0], [0.3, 0.0, 1.0], normal=y)
+    bed = {"z": 0.0, "stiffness": 1e4}
+    scene = cable_scene(section, *ends, seabed=bed, model="rod", mesh=120, time=(1.0, 0.02))
     rest = hybrid.static(scene)
     measured, tables = hybrid.plan(scene).critical_torque, hybrid.plan(scene, measure=False).critical_torque
     assert measured is not None and tables is not None and tables.rough and not measured.rough

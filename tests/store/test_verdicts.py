@@ -13,7 +13,6 @@ import pytest
 from reported import reported
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.cli.tables import errors_facts, extremes_facts, extremes_rows
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.scene.study import Kept
@@ -35,6 +34,7 @@ from hybrid.store.verdicts import (
 from hybrid.studies.workers import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
+from tests.called import Call
 from tests.scenes import cable_scene, pinned_at
 
 LIMITS = ("min_bend_radius", "max_tension", "min_tension")
@@ -117,13 +117,11 @@ def word_in(text: str) -> str:
     return "within" if "not below" in text else text
 
 
-def of_stats(path: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+def of_stats(path: Path, call: Call) -> dict[str, str]:
     """By the lines of `hybrid stats`."""
-    capsys.readouterr()
-    with pytest.raises(SystemExit) as ended:
-        main(["stats", str(path), "--names", "tension"])
-    assert not ended.value.code
-    said, found = " ".join(capsys.readouterr().out.split()), {}
+    told = call("stats", str(path), "--names", "tension")
+    assert not told.code
+    said, found = " ".join(told.out.split()), {}
     what = r"(?:bend radius|tension|von_mises|gap) of \S+ (?:m|N|Pa)"
     for text in re.findall(rf"{what}, .*?(?={what}|$)", said):
         name = next(x for x in (*LIMITS, "von_mises max_stress", "gap smallest") if x.split()[0] in text)
@@ -162,9 +160,7 @@ def of_study(result: Result) -> dict[str, str]:
 
 
 @pytest.mark.long
-def test_thirty_results_say_the_same_everywhere(
-    results: dict[tuple[str, str], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_thirty_results_say_the_same_everywhere(results: dict[tuple[str, str], Path], call: Call) -> None:
     seen: dict[str, int] = {}
     for key, path in results.items():
         with hybrid.open(path) as result:
@@ -188,7 +184,7 @@ def test_thirty_results_say_the_same_everywhere(
             for word in words.values():
                 seen[word] = seen.get(word, 0) + 1
         if not RUNS[key[0]][1]:  # of one output there are no statistics
-            assert of_stats(path, capsys) == words, key
+            assert of_stats(path, call) == words, key
     assert min(seen[x] for x in ("within", "broken", "not verified")) > 10, seen
 
 

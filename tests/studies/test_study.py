@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,13 +13,13 @@ import pytest
 from killed_studies import killed_study
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.errors import ResultError, SceneError
 from hybrid.scene.study import Kept, read_study, study_from
 from hybrid.store.study_file import DONE, FAILED, KILLED, NOT_WRITTEN, OPEN, StudyFile
 from hybrid.studies.cases import cases_of, short_names
 from hybrid.studies.study import client_of
 from hybrid.studies.workers import collected
+from tests.called import Call
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 
@@ -395,22 +394,17 @@ def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path, s
     assert np.isnan(found["t_profile"].values[1]).all() and "t_profile" in str(found["reason"].values[1])
 
 
-def test_the_command_says_ranges_and_reasons(
-    folder: Path, found: object, tmp_path: Path, capsys: pytest.CaptureFixture
-) -> None:
+def test_the_command_says_ranges_and_reasons(folder: Path, found: object, tmp_path: Path, call: Call) -> None:
     command = ["study", str(folder / "heave.yaml"), "--json", "--netcdf", str(tmp_path / "x.nc")]
     (tmp_path / "x.nc").write_text("measured for months\n")  # it was written over
-    with pytest.raises(SystemExit) as ended:
-        main(command)
-    assert ended.value.code == 1 and "was not exported by hybrid" in capsys.readouterr().out
+    refused = call(*command)
+    assert refused.code == 1 and "was not exported by hybrid" in refused.out
     assert (tmp_path / "x.nc").read_text() == "measured for months\n"
     (tmp_path / "x.nc").unlink()
     for _ in range(2):  # one of an earlier call is replaced
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main(command)
-        assert not ended.value.code
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+        told = call(*command)
+        assert not told.code
+    lines = told.lines
     largest = next(x for x in lines if x.get("name") == "force_max")
     assert largest["largest"] == np.nanmax(found["force_max"].values) and largest["case"] == 4
     assert next(x for x in lines if x["event"] == "failed")["cases"] == [8]

@@ -11,7 +11,6 @@ import pytest
 from bits import Stopping
 
 import hybrid
-from hybrid.cli.commands import main
 from hybrid.cli.console import Console
 from hybrid.cli.study_commands import _show
 from hybrid.errors import SceneError
@@ -24,6 +23,7 @@ from hybrid.studies.cases import Cases, cases_of
 from hybrid.studies.study import _created, _refuse_limits_not_there, _remove_cases
 from hybrid.studies.workers import Job, compute_batch, write_outcomes
 from hybrid.view.several_runs import html
+from tests.called import Call
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 
@@ -172,33 +172,25 @@ def test_a_study_that_begins_anew_removes_snapshots_of_failed_cases(tmp_path: Pa
     assert [x.name for x in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_stats_tell_limits_and_the_time_above_a_value(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_stats_tell_limits_and_the_time_above_a_value(scene: Path, tmp_path: Path, call: Call) -> None:
     result = hybrid.run(scene, tmp_path / "run.h5", progress=False)
     used, part = result.utilisation()["max_tension"].used, float(result.exceedance("end_force_end", 400.0))
     result.close()
-    with pytest.raises(SystemExit) as ended:
-        main(["stats", str(tmp_path / "run.h5"), "--names", "end_force_end", "--above", "400"])
-    assert not ended.value.code
-    said = " ".join(capsys.readouterr().out.split())
+    told = call("stats", "run.h5", "--names", "end_force_end", "--above", "400")
+    said = " ".join(told.out.split())
+    assert not told.code
     assert f"end_force_end is above 400 N for {100.0 * part:.3g} % of the time" in said
     assert used is not None and f"{100.0 * used:.4g} % of max_tension used" in said
     assert "MBR utilisation of" in said
 
 
 def test_stats_of_a_run_that_was_stopped_say_so(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    scene: Path, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene.write_text(SCENE.replace("errors: true", "errors: false"))
-    stopping = Stopping(monkeypatch)
-    stopping.left = 20
-    with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene, tmp_path / "run.h5", progress=stopping)
-    with pytest.raises(SystemExit) as ended:
-        main(["stats", str(tmp_path / "run.h5"), "--names", "end_force_end"])
-    assert not ended.value.code
-    assert "note: of a run that has not come to its end; interrupted" in " ".join(capsys.readouterr().err.split())
+    Stopping(monkeypatch).stop(20, hybrid.run, scene, tmp_path / "run.h5")
+    told = call("stats", "run.h5", "--names", "end_force_end")
+    assert not told.code and "note: of a run that has not come to its end; interrupted" in " ".join(told.err.split())
 
 
 def test_statistics_name_what_has_none(scene: Path) -> None:

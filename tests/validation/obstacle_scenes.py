@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from tests.scenes import cable_scene, pinned_at
+
 Tables = dict[str, Any]
 STRAND, DRUM = 0.01, 0.3  # m, radius of the rope and of the drum
 CENTRELINE = STRAND + DRUM
@@ -29,16 +31,12 @@ def capstan(friction: float, pull: float, model: str = "catenary", cells: int = 
     length = float(3.3 + np.pi * CENTRELINE)
     section = {"length": length, "mass": 0.1, "diameter": 2 * STRAND, "axial_stiffness": 2e4,
                "bending_stiffness": 1e-5, "damping": {"mass": 20.0}}  # fmt: skip
-    return {
-        "environment": {"gravity": 0}, "cable": {"sections": [section]}, "obstacles": drum(friction),
-        "ends": {
-            "start": {"kind": "pinned", "position": [-CENTRELINE, 0, -3.0]},
-            "end": {"kind": "free", "force": {"history": [[0, 0, 0, -10], [1.5, 0, 0, -pull]]}},
-        },
-        "initial": {"kind": "equilibrium", "points": half_turn(CENTRELINE, 3.0, 0.3)},
-        "model": model, "mesh": {"cells": cells}, "contact": {"self": False},
-        "time": {"duration": 2.0, "step": 0.01}, "output": {"every": 0.1, "points": 101},
-    }  # fmt: skip
+    pulled = {"kind": "free", "force": {"history": [[0, 0, 0, -10], [1.5, 0, 0, -pull]]}}
+    return cable_scene(
+        section, pinned_at(-CENTRELINE, 0, -3.0), pulled, gravity=0, obstacles=drum(friction),
+        initial={"kind": "equilibrium", "points": half_turn(CENTRELINE, 3.0, 0.3)}, model=model, mesh=cells,
+        contact={"self": False}, time=(2.0, 0.01), output=(0.1, 101)
+    )  # fmt: skip
 
 
 def heavy_capstan(friction: float) -> Tables:
@@ -47,13 +45,11 @@ def heavy_capstan(friction: float) -> Tables:
     section = {"length": float(light + heavy + np.pi * R), "mass": 0.01, "diameter": 0.002, "axial_stiffness": 1e3,
                "bending_stiffness": 1e-9, "damping": {"mass": 2.0}}  # fmt: skip
     up = {"velocity": [0, 0, 0.01], "ramp": 0.2}
-    return {
-        "cable": {"sections": [section]}, "obstacles": drum(friction, 0.05),
-        "ends": {"start": {"kind": "pinned", "position": [-R, 0, -light], "motion": up}, "end": {"kind": "free"}},
-        "initial": {"kind": "equilibrium", "points": half_turn(R, light, heavy)},
-        "model": "rod", "mesh": {"cells": 240}, "contact": {"self": False},
-        "time": {"duration": 1.5, "step": 0.005}, "output": {"every": 0.1, "points": 101},
-    }  # fmt: skip
+    return cable_scene(
+        section, pinned_at(-R, 0, -light, motion=up), {"kind": "free"}, obstacles=drum(friction, 0.05),
+        initial={"kind": "equilibrium", "points": half_turn(R, light, heavy)}, model="rod", mesh=240,
+        contact={"self": False}, time=(1.5, 0.005), output=(0.1, 101)
+    )  # fmt: skip
 
 
 def over_pipe(**more: Any) -> Tables:
@@ -61,16 +57,11 @@ def over_pipe(**more: Any) -> Tables:
     section = {"length": 12.0, "mass": 2.0, "diameter": 0.05, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
                "damping": {"mass": 0.5}}  # fmt: skip
     pipe = {"kind": "cylinder", "at": [4, 0, -1.7], "axis": [0.1, 1, 0.05], "radius": 1.2, "friction": 0.3}
-    return {
-        "cable": {"sections": [section]}, "obstacles": {"pipe": pipe},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0]},
-            "end": {"kind": "pinned", "position": [10, 0, 3],
-                    "motion": {"travel": {"by": [0.3, 0.3, 0.2], "over": 1.0}}},
-        },
-        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 64}, "contact": {"self": False},
-        "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.2, "points": 65},
-    } | more  # fmt: skip
+    travel = {"travel": {"by": [0.3, 0.3, 0.2], "over": 1.0}}
+    return cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(10, 0, 3, motion=travel), obstacles={"pipe": pipe}, model="rod", mesh=64,
+        contact={"self": False}, time=(2.0, 0.02), output=(0.2, 65)
+    ) | more  # fmt: skip
 
 
 def over_beam(beam: Tables) -> Tables:

@@ -17,13 +17,11 @@ from hybrid.kernels.junctions.bodies import PLACE, W
 from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_network
 from hybrid.scene.bodies import turned
-from hybrid.scene.network import Network
-from hybrid.scene.read import as_scene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
 from tests.combinations.pairs import seen_by
-from tests.scenes import line_between, network_scene
+from tests.scenes import line_between, network_scene, system_of
 
 RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
 Tables = dict[str, Any]
@@ -87,9 +85,7 @@ def test_what_rests_stays_and_an_obstacle_there_holds_the_lines_the_same(rest: A
 
 
 def _rows(tables: Tables) -> Any:
-    network = as_scene(tables)
-    assert isinstance(network, Network)
-    return build_network(network).models[0].sea.values.obstacles
+    return build_network(system_of(tables)).models[0].sea.values.obstacles
 
 
 @pytest.mark.long
@@ -359,9 +355,7 @@ def test_a_line_ignores_the_body_that_it_is_fixed_to_until_it_has_left_it() -> N
 
 def test_newtons_method_converges_quadratically() -> None:
     """A step of a spinning ball pressed on lines, with friction: what is left falls by squares once contact is found."""
-    network = as_scene(pushed())
-    assert isinstance(network, Network)
-    model = build_network(network)
+    model = build_network(system_of(pushed()))
     solver = NetworkSolver(joined_lines(model, 0.0), 0, model.body_numbers(0.0))
     start = NetworkState([x.start for x in model.models], model.body_places).copy()
     start.bodies[0, PLACE + 2] = 0.574  # 2 mm deep

@@ -18,13 +18,11 @@ from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_network
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.network import Network
-from hybrid.scene.read import as_scene
 from hybrid.simulation.equilibrium import joined_lines
 from hybrid.simulation.lines_contact import shared_of
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stepper import NetworkState
-from tests.scenes import line_between, network_scene
+from tests.scenes import each_line, line_between, network_scene, system_of
 from tests.validation.test_validation_body_contact import MASS, on_two_lines, pushed, turns_with_its_scene
 from tests.validation.thrown_lines import WIDTH, straight, throw
 
@@ -98,10 +96,8 @@ def test_contact_that_does_not_come_about_changes_nothing() -> None:
     """Lines side by side, which may touch themselves and each other: the run of tests that have no such contact."""
     tables = pushed() | {"time": {"duration": 0.25, "step": 0.005}}
     bare = hybrid.run(tables)
-    for line in tables["lines"].values():
-        line["contact"] = {"self": True}
     for contact in ({}, {"contact": {"friction": 0.2}}):
-        result = hybrid.run(tables | contact)
+        result = hybrid.run(each_line(tables, contact={"self": True}) | contact)
         for side, x in bare.lines.items():
             assert np.linalg.norm(x["obstacles/ball/force"], axis=1).max() > 1.0
             np.testing.assert_allclose(result.lines[side].position, x.position, atol=1e-9)
@@ -118,9 +114,7 @@ def cradle() -> Tables:
         for end, y in (("0", -5.0), ("10", 5.0)):
             tables["points"][f"{end}{name}"] = {"position": [x, y, -0.03]}
         tables["lines"][name] = tables["lines"]["left"] | {"start": f"0{name}", "end": f"10{name}"}
-    for line in tables["lines"].values():
-        line["mesh"] = {"cells": 60}
-    return tables | {"contact": {}}
+    return each_line(tables, mesh=60) | {"contact": {}}
 
 
 @pytest.mark.long
@@ -135,19 +129,13 @@ def test_a_ball_rests_on_lines_that_lie_on_others() -> None:
         assert line["self_contact"][-1].max() > 20.0
     for name in ("fore", "aft"):
         assert not rest.lines[name]["obstacles/ball/force"].any()
-    stiffness = float(build_of(tables).models[0].sea.values.obstacles[0, STIFFNESS])
+    stiffness = float(build_network(system_of(tables)).models[0].sea.values.obstacles[0, STIFFNESS])
     at = rest["bodies/ball/position"][-1].tolist()
     del tables["bodies"]
     tables["obstacles"] = {"ball": {"kind": "sphere", "at": at, "radius": 0.6, "stiffness": stiffness}}
     held = hybrid.static(tables)
     for name, line in rest.lines.items():
         np.testing.assert_allclose(held.lines[name].position, line.position, atol=1e-8)
-
-
-def build_of(tables: Tables) -> Any:
-    network = as_scene(tables)
-    assert isinstance(network, Network)
-    return build_network(network)
 
 
 # --- free flight ----------------------------------------------------------------------------------------
@@ -184,7 +172,7 @@ def test_newtons_method_converges_quadratically(mass: float) -> None:
     """
     tables = crossed()
     tables["bodies"]["ball"] |= {"mass": mass, "inertia": [0.15 * mass] * 3}
-    model = build_of(tables)
+    model = build_network(system_of(tables))
     lines, found = joined_lines(model, 0.0), []
     for most in (3, 4, 5, 12):
         solver = NetworkSolver(lines, 0, model.body_numbers(0.0), shared=shared_of(model))

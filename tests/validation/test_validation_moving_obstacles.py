@@ -15,7 +15,6 @@ import hybrid
 from hybrid.errors import SceneError
 from tests.scenes import cable_scene, pinned_at
 from tests.validation.obstacle_scenes import CENTRELINE, STRAND, Tables, capstan, half_turn
-from tests.validation.test_validation_obstacles_accuracy import ASKED, DRAGGED, LOW, parts
 
 MU = 0.3
 
@@ -465,21 +464,3 @@ def test_a_shape_that_is_set_from_outside_moves_as_by_a_motion(by_shape: Any) ->
     result, kind = by_shape
     _, other = stepped(from_outside(by(kind)), False)
     np.testing.assert_allclose(other.position, result.position, atol=1e-3)
-
-
-# --- accuracy --------------------------------------------------------
-
-BEAM = {"kind": "box", "at": [4, 0, -2.1], "size": [2.0, 3.0, 2.2], "rounding": 0.6, "rotation": [5, -10, 15],
-        "friction": 0.3}  # fmt: skip
-
-
-@pytest.mark.long
-def test_what_is_asked_is_met_on_a_beam() -> None:
-    tables = DRAGGED | {"obstacles": {"beam": BEAM | {"rounding": 1.0}}}
-    duration = tables["time"]["duration"]
-    truth = hybrid.run(tables | {"mesh": {"cells": 600}, "time": {"duration": duration, "step": 0.005}})
-    result = hybrid.run(tables | {"accuracy": "2%"})
-    assert "accuracy missed" not in {x.kind for x in result.events}
-    for name, (said, true) in parts(result, truth).items():
-        assert true < ASKED, (name, said, true)
-        assert said > LOW * true, (name, said, true)

@@ -38,6 +38,9 @@ def scene(of_end: Tables | None, duration: float, **pipe: Any) -> Tables:
 
 HEAVE = scene({"heave": {"amplitude": 0.5, "period": 3.0}, "ramp": 3.0}, 6.0)  # it lifts off and comes down again
 DRAGGED = scene({"travel": {"by": [0.6, 0.5, 0.4], "over": 3.0}}, 4.0)  # it slides over the pipe
+BEAM = {"kind": "box", "at": [4, 0, -2.1], "size": [2.0, 3.0, 2.2], "rounding": 1.0, "rotation": [5, -10, 15],
+        "friction": 0.3}  # fmt: skip
+ON_BEAM = DRAGGED | {"obstacles": {"beam": BEAM}}
 MOVES = scene(None, 3.0, motion={"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0})
 
 
@@ -61,7 +64,7 @@ def heaved() -> Any:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("tables", [HEAVE, DRAGGED, MOVES], ids=["heave", "dragged", "pipe moves"])
+@pytest.mark.parametrize("tables", [HEAVE, DRAGGED, MOVES, ON_BEAM], ids=["heave", "dragged", "pipe moves", "beam"])
 def test_figures_are_those_of_a_fine_run_and_steps_meet_what_is_asked(tables: Tables, heaved: Any) -> None:
     """Contact opens and closes, and friction holds and slides: none of three figures is below the truth."""
     duration = tables["time"]["duration"]

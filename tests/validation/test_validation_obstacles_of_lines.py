@@ -12,18 +12,11 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.state.report import STIFFNESS
 from hybrid.model.network import build_network
-from hybrid.scene.network import Network
-from hybrid.scene.read import as_scene
+from tests.scenes import system_of
 from tests.validation.obstacle_scenes import CENTRELINE, DRUM, STRAND, Tables, drum, half_turn, over_pipe
 
 MU, WEIGHT = 0.3, 100.0
 CELLS = 64
-
-
-def system_of(tables: Tables) -> Network:
-    found = as_scene(tables)
-    assert isinstance(found, Network)
-    return found
 
 
 # --- a line that is cut -------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.scenes import cable_scene
+from tests.scenes import cable_scene, clamped_at
 
 RODS = ({"rod": 12, "cells": 48}, {"rod": 36, "cells": 144}, {"rod": 12, "cells": 48})
 
@@ -19,17 +19,11 @@ def sag(turns, zones, **more):
         "drag": {"normal": 1.2}, "damping": {"mass": 0.2},
     }  # fmt: skip
     current = {"kind": "uniform", "velocity": [0.0, 0.3, 0.0]}
-    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0.75, 0, -0.66], "normal": [0, 1, 0]}
-    end = {"kind": "clamped", "position": [55, 0, 0], "tangent": [0.75, 0, 0.66], "normal": [0, 1, 0], "turns": turns}
+    start = clamped_at([0, 0, 0], [0.75, 0, -0.66], normal=[0, 1, 0])
+    end = clamped_at([55, 0, 0], [0.75, 0, 0.66], normal=[0, 1, 0], turns=turns) | more.pop("end", {})
+    around = {"gravity": 9.81, "fluid": {"density": 1000.0, "current": current}}
     return hybrid.validate_scene(
-        {
-            "environment": {"gravity": 9.81, "fluid": {"density": 1000.0, "current": current}},
-            "cable": {"sections": [section]},
-            "ends": {"start": start, "end": end | more.pop("end", {})},
-            "initial": "equilibrium",
-            "model": {"kind": "zones", "zones": zones},
-            **more,
-        }
+        cable_scene(section, start, end, model={"kind": "zones", "zones": zones}, **around) | more
     )
 
 

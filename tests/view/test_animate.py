@@ -76,15 +76,6 @@ def test_frames_are_the_outputs_nearest_to_even_times() -> None:
     assert backend._frames(result, 1000).tolist() == list(range(101))
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [("run.avi", "ends in .mp4 or .gif"), ("missing/run.gif", "there is no folder"), (".", "is a folder")],
-)
-def test_what_cannot_be_written_is_refused(tmp_path: Path, name: str, words: str) -> None:
-    with pytest.raises(ResultError, match=words):
-        backend.animate(reported(), tmp_path / name)
-
-
 @pytest.mark.parametrize("outputs", [0, 1])
 def test_what_does_not_move_is_refused(tmp_path: Path, outputs: int) -> None:
     with pytest.raises(ResultError, match="nothing moves"):
@@ -160,6 +151,9 @@ def test_a_picture_of_another_program_is_not_ours(tmp_path: Path) -> None:
         (animate, "run.png", "unknown file format\n    expected: .* .mp4 or .gif"),
         (hybrid.plot, "no/run.png", "there is no folder .*no\n    try: "),
         (hybrid.plot, ".", "is a folder\n    try: .*run.png"),
+        (animate, "run.avi", "ends in .mp4 or .gif"),
+        (animate, "missing/run.gif", "there is no folder"),
+        (animate, ".", "is a folder"),
     ],
 )
 def test_a_name_that_cannot_be_written_is_refused(write: Write, name: str, words: str, tmp_path: Path) -> None:

@@ -29,7 +29,8 @@ from hybrid.view.lines import AllLines, arms_of, clearest_view, motions, page, p
 from hybrid.view.matplotlib_backend import animate
 from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape
 from hybrid.view.report import _extreme_text, html
-from tests.scenes import network_scene
+from tests.scenes import cable_scene, clamped_at, each_line, network_scene, pinned_at
+from tests.simulation.bits import Stopping
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 ENDS = {"start": 0, "end": 11.5}
@@ -213,10 +214,9 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
 @pytest.fixture(scope="module", params=[as_scene, in_full])
 def alone(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
     """A line without a name, and the same with one."""
-    ends = {name: {"kind": "pinned", "position": [x, 0, 0]} for name, x in ENDS.items()}
+    ends = {name: pinned_at(x, 0, 0) for name, x in ENDS.items()}
     section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
-    asked = {"cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 40}}
-    asked |= {"initial": "equilibrium", "time": {"duration": 0.4, "step": 0.1}, "output": {"every": 0.1, "points": 11}}
+    asked = cable_scene(section, **ends, model="adaptive", mesh=40, time=(0.4, 0.1), output=(0.1, 11))
     return hybrid.run(request.param(as_scene(asked)), tmp_path_factory.mktemp("alone") / "run.h5")
 
 
@@ -258,12 +258,9 @@ def test_zones_and_the_search_are_said_of_one_line_and_of_many(
     form: Callable[[Any], hybrid.Scene], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of lines with names how much was rod was not said, and how the equilibrium was found behind the file alone."""
-    ends = {name: {"kind": "clamped", "position": [x, 0, 0], "tangent": [1, 0, 0]} for name, x in ENDS.items()}
+    ends = {name: clamped_at([x, 0, 0], [1, 0, 0]) for name, x in ENDS.items()}
     section = SECTION | {"length": 12, "bending_stiffness": 5.0, "diameter": 0.05}
-    asked = form(as_scene({
-        "cable": {"sections": [section]}, "ends": ends, "model": "adaptive", "mesh": {"cells": 60},
-        "initial": "equilibrium", "time": {"duration": 0.2, "step": 0.1},
-    }))  # fmt: skip
+    asked = form(as_scene(cable_scene(section, **ends, model="adaptive", mesh=60, time=(0.2, 0.1))))
     show_motion(Console(False, False), asked, hybrid.run(asked), Path("run.h5"))
     moved = capsys.readouterr().out
     assert re.search(r"rod: \d+% of the line, all the time|rod: \d+% to \d+% of the line", moved)
@@ -325,10 +322,8 @@ def test_commands_take_all_lines_or_one(path: Path, tmp_path: Path, monkeypatch:
 
 def test_an_equilibrium_is_drawn_as_one_picture_of_all_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    scene = spar()
+    scene = each_line(spar(), sections=[SECTION | {"bending_stiffness": 1e4}], model="rod")
     del scene["time"], scene["output"]["every"]
-    for line in scene["lines"].values():
-        line |= {"sections": [SECTION | {"bending_stiffness": 1e4}], "model": "rod"}
     Path("spar.yaml").write_text(json.dumps(scene))
     told = CliRunner().invoke(app, ["static", "spar.yaml", "--plot"])
     assert told.exit_code == 0 and "spar.static.png" in told.output
@@ -338,19 +333,10 @@ def test_an_equilibrium_is_drawn_as_one_picture_of_all_lines(tmp_path: Path, mon
 
 
 @pytest.mark.long
-def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
+def test_a_stopped_run_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file with fewer outputs than were asked for, and an equilibrium with one."""
-
-    def stop(progress: Any) -> None:
-        if progress.step >= 30:
-            raise KeyboardInterrupt
-
     target = tmp_path / "part.h5"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybrid.simulation.progress.REPORT_EVERY", -1.0)
-        patch.setattr("hybrid.solve.network_steps.CELL_STEPS", 1)  # a step a call
-        with pytest.raises(KeyboardInterrupt):
-            hybrid.run(spar(), target, progress=stop)
+    Stopping(monkeypatch).stop(30, hybrid.run, spar(), target)
     with hybrid.open(target) as part:
         assert part.status == "interrupted" and 1 < AllLines(part).outputs < 21
         assert "interrupted" in page(part).facts and "interrupted" in html(part).lower()
@@ -429,10 +415,7 @@ def test_the_table_of_many_lines_fits(
 
 
 def test_a_plan_of_many_lines_has_a_row_for_those_that_are_alike() -> None:
-    scene = fan()
-    for line in scene["lines"].values():
-        line["sections"] = [SECTION]
-    network = as_scene(scene)
+    network = as_scene(each_line(fan(), sections=[SECTION]))
     rows = plan_rows(network, hybrid.plan(network, measure=False))  # type: ignore[arg-type]
     assert any(x.startswith("14 lines ") and "120 m" in x for x in rows) and not any(
         x.startswith("line ") for x in rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -29,14 +28,6 @@ for t in (2.0, 10.0):
 tell.close()
 reported(outputs=41)
 """
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    from browsed import opened_browser
-
-    with opened_browser() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")

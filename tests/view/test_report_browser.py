@@ -17,7 +17,7 @@ import pytest
 
 pytestmark = extras.of_file("playwright")
 
-from browsed import Visited, opened_browser
+from browsed import Visited
 from PIL import Image
 from reported import reported
 
@@ -26,12 +26,6 @@ from hybrid.view.report import write_report
 
 DRAWN = "document.getElementById('plot-end-forces').classList.contains('drawn')"
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend 1.05 > 1 at s = 49 to 51 m"), (7.0, 0.0, 100.0, "snap", "a <b>peak</b>")]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with opened_browser() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")
@@ -72,12 +66,17 @@ class Visit(Visited):
 
 
 @pytest.fixture
-def visit(browser: Any, page_file: Path) -> Iterator[Visit]:
-    opened = Visit(browser, page_file)
+def visit(browser: Any, page_file: Path, request: pytest.FixtureRequest) -> Iterator[Visit]:
+    """Of a screen that a test asks for by `on`."""
+    opened = Visit(browser, page_file, **getattr(request, "param", {}))
     yield opened
     opened.context.close()
     assert not opened.complaints
     assert [url.split(":")[0] for url in opened.asked if not url.startswith(("data:", "blob:"))] == ["file"]
+
+
+def on(*screens: dict[str, Any]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("visit", screens, indirect=True)
 
 
 @pytest.mark.long
@@ -179,20 +178,18 @@ def test_show_takes_the_reader_to_the_moment(visit: Visit) -> None:
 
 
 @pytest.mark.slow
-def test_a_phone_shows_it_without_scrolling_sideways(browser: Any, page_file: Path) -> None:
-    phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-    opened = Visit(browser, page_file, **phone)
-    for plot in opened.page.query_selector_all(".plot[data-figure]"):
-        opened.shown(f"#{plot.get_attribute('id')}")
-    assert opened.page.evaluate("document.documentElement.scrollWidth") == 390
-    for target in opened.page.query_selector_all("button, select, input, summary"):
+@on({"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True})
+def test_a_phone_shows_it_without_scrolling_sideways(visit: Visit) -> None:
+    for plot in visit.page.query_selector_all(".plot[data-figure]"):
+        visit.shown(f"#{plot.get_attribute('id')}")
+    assert visit.page.evaluate("document.documentElement.scrollWidth") == 390
+    for target in visit.page.query_selector_all("button, select, input, summary"):
         size = target.bounding_box()
         assert size and size["height"] >= 44 and size["width"] >= 44 and size["x"] + size["width"] <= 390
-    small = opened.page.evaluate(
+    small = visit.page.evaluate(
         "[...document.querySelectorAll('.plot text')].map(x => parseFloat(getComputedStyle(x).fontSize)).filter(x => x < 11)"
     )
-    assert not small and not opened.complaints
-    opened.context.close()
+    assert not small
 
 
 @pytest.mark.parametrize(
@@ -230,39 +227,35 @@ def test_other_results_open_without_complaint(browser: Any, tmp_path: Path, aske
 
 
 @pytest.mark.long
-def test_the_cable_is_drawn_when_it_is_looked_at_as_it_is_then(browser: Any, page_file: Path) -> None:
+@on({"cable": False, "viewport": {"width": 1280, "height": 500}})
+def test_the_cable_is_drawn_when_it_is_looked_at_as_it_is_then(visit: Visit, browser: Any, page_file: Path) -> None:
     """Until then its still drawing is there; time that went on before is that of the drawing."""
-    opened = Visit(browser, page_file, cable=False, viewport={"width": 1280, "height": 500})
-    assert opened.page.query_selector("#cable-plot svg.poster").is_visible()
-    assert opened.page.evaluate("window.report.cable === undefined && !document.querySelector('#cable-plot canvas')")
-    high = opened.page.evaluate("document.getElementById('cable-plot').clientHeight")
-    opened.page.eval_on_selector("#time", "x => { x.value = '25'; x.dispatchEvent(new Event('input')); }")
-    opened.shown("#cable-plot")
-    opened.page.wait_for_function("window.report.cable", timeout=60_000)
-    assert not opened.page.query_selector("#cable-plot svg.poster").is_visible()
-    assert opened.page.evaluate("document.getElementById('cable-plot').clientHeight") == high, "nothing moves"
-    moved, first = opened.cable(), Visit(browser, page_file).cable()
+    assert visit.page.query_selector("#cable-plot svg.poster").is_visible()
+    assert visit.page.evaluate("window.report.cable === undefined && !document.querySelector('#cable-plot canvas')")
+    high = visit.page.evaluate("document.getElementById('cable-plot').clientHeight")
+    visit.page.eval_on_selector("#time", "x => { x.value = '25'; x.dispatchEvent(new Event('input')); }")
+    visit.shown("#cable-plot")
+    visit.page.wait_for_function("window.report.cable", timeout=60_000)
+    assert not visit.page.query_selector("#cable-plot svg.poster").is_visible()
+    assert visit.page.evaluate("document.getElementById('cable-plot').clientHeight") == high, "nothing moves"
+    moved, first = visit.cable(), Visit(browser, page_file).cable()
     assert moved[2] - first[2] == pytest.approx(2.0 * np.linspace(0.0, 100.0, 41) / 100.0, abs=1e-4)
-    assert not opened.complaints
-    opened.context.close()
 
 
 @pytest.mark.long
-def test_stills_stand_until_plotly_draws(browser: Any, page_file: Path) -> None:
+@on({"cable": False, "viewport": {"width": 1280, "height": 400}})
+def test_stills_stand_until_plotly_draws(visit: Visit) -> None:
     """plotly starts with the first picture that is looked at; its graph has the limits of the still drawing."""
-    opened = Visit(browser, page_file, cable=False, viewport={"width": 1280, "height": 400})
-    assert opened.page.evaluate("window.Plotly === undefined")
-    stills = opened.page.query_selector_all(".plot svg.still")
-    assert len(stills) == len(opened.page.query_selector_all(".plot[data-figure]")) > 5
+    assert visit.page.evaluate("window.Plotly === undefined")
+    stills = visit.page.query_selector_all(".plot svg.still")
+    assert len(stills) == len(visit.page.query_selector_all(".plot[data-figure]")) > 5
     assert all(still.is_visible() for still in stills)
-    graph = opened.shown("#plot-end-forces")
-    opened.page.wait_for_function(DRAWN)
+    graph = visit.shown("#plot-end-forces")
+    visit.page.wait_for_function(DRAWN)
     assert not graph.query_selector("svg.still").is_visible() and graph.query_selector(".main-svg").is_visible()
-    assert opened.page.query_selector("#plot-energy svg.still").is_visible()
-    opened.shown("#cable-plot")
-    opened.page.wait_for_function("window.report.cable", timeout=60_000)
-    assert not opened.complaints
-    opened.context.close()
+    assert visit.page.query_selector("#plot-energy svg.still").is_visible()
+    visit.shown("#cable-plot")
+    visit.page.wait_for_function("window.report.cable", timeout=60_000)
 
 
 @pytest.mark.long
@@ -291,15 +284,15 @@ def test_without_webgl_the_cable_is_shown_still(browser: Any, page_file: Path) -
 
 @pytest.mark.long
 @pytest.mark.needs("pypdfium2")
-def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
+@on({"cable": False, "color_scheme": "dark"})
+def test_paper_has_every_picture(visit: Visit) -> None:
     """Printed from a dark screen before anything was scrolled to: A4, light, every still drawing, folds open."""
     import pypdfium2 as pdfium
 
-    opened = Visit(browser, page_file, cable=False, color_scheme="dark")
-    sheets = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True, print_background=True))
-    plain = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True))  # as browsers print unless told otherwise
-    assert opened.page.evaluate("window.Plotly === undefined"), "paper does not need it"
-    graphs = len(opened.page.query_selector_all(".plot[data-figure]"))
+    sheets = pdfium.PdfDocument(visit.page.pdf(prefer_css_page_size=True, print_background=True))
+    plain = pdfium.PdfDocument(visit.page.pdf(prefer_css_page_size=True))  # as browsers print unless told otherwise
+    assert visit.page.evaluate("window.Plotly === undefined"), "paper does not need it"
+    graphs = len(visit.page.query_selector_all(".plot[data-figure]"))
     text, ink = "", []
     for sheet, bare in zip(sheets, plain, strict=True):
         pair = [np.asarray(x.render(scale=0.7).to_pil(), float) for x in (sheet, bare)]
@@ -312,8 +305,8 @@ def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
     for k in range(graphs + 1):
         assert f"Figure {k + 1}." in text
     assert "Made-up mooring" in text and "title: Made-up mooring" in text  # the scene, which is folded on a screen
-    opened.page.emulate_media(media="print")
-    stills = opened.page.query_selector_all(".plot svg.still, .plot svg.poster")
+    visit.page.emulate_media(media="print")
+    stills = visit.page.query_selector_all(".plot svg.still, .plot svg.poster")
     assert len(stills) == graphs + 1 and all(still.is_visible() for still in stills)
     for still in stills:
         assert np.asarray(Image.open(io.BytesIO(still.screenshot())).convert("L"), float).std() > 5.0
@@ -323,32 +316,26 @@ def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
         filled = np.flatnonzero(rows)
         gap = max(np.diff(filled).max(), len(rows) - filled[-1])
         assert gap < 0.5 * len(rows), "half a page is empty"
-    assert not opened.complaints
-    opened.context.close()
 
 
 @pytest.mark.long
-def test_a_dark_screen_gets_a_dark_page_and_the_other_way_round(browser: Any, page_file: Path) -> None:
-    opened = Visit(browser, page_file, color_scheme="dark")
-    assert opened.pixels("#plot-end-forces").mean() < 80.0 and opened.pixels("#cable-plot").mean() < 80.0
-    opened.page.emulate_media(color_scheme="light")
-    opened.page.wait_for_timeout(500)
-    assert opened.pixels("#plot-end-forces").mean() > 200.0 and opened.pixels("#cable-plot").mean() > 200.0
-    assert not opened.complaints
-    opened.context.close()
+@on({"color_scheme": "dark"})
+def test_a_dark_screen_gets_a_dark_page_and_the_other_way_round(visit: Visit) -> None:
+    assert visit.pixels("#plot-end-forces").mean() < 80.0 and visit.pixels("#cable-plot").mean() < 80.0
+    visit.page.emulate_media(color_scheme="light")
+    visit.page.wait_for_timeout(500)
+    assert visit.pixels("#plot-end-forces").mean() > 200.0 and visit.pixels("#cable-plot").mean() > 200.0
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.needs("axe-playwright-python")
-def test_nothing_serious_for_screen_readers_and_keyboards(browser: Any, page_file: Path, scheme: str) -> None:
+@on(*({"color_scheme": scheme, "bypass_csp": True} for scheme in ("light", "dark")))
+def test_nothing_serious_for_screen_readers_and_keyboards(visit: Visit) -> None:
     from axe_playwright_python.sync_playwright import Axe
 
-    opened = Visit(browser, page_file, color_scheme=scheme, bypass_csp=True)
-    found = Axe().run(opened.page).response["violations"]
+    found = Axe().run(visit.page).response["violations"]
     serious = [(x["id"], [n["target"] for n in x["nodes"]]) for x in found if x["impact"] in ("serious", "critical")]
     assert not serious
-    opened.context.close()
 
 
 @pytest.mark.bench

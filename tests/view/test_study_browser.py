@@ -12,7 +12,7 @@ import pytest
 
 pytestmark = extras.of_file("playwright", "dask", "zarr", "xarray")
 
-from test_report_browser import Visit, browser  # noqa: F401
+from test_report_browser import Visit
 
 from hybrid.store.study_file import DONE, FAILED, Column, StudyFile
 from hybrid.view.several_runs import write_study_report
@@ -52,7 +52,7 @@ def cells(visit: Any, column: int) -> list[str]:
 
 
 @pytest.mark.long
-def test_a_page_of_2000_cases(browser: Any, page: Path) -> None:  # noqa: F811
+def test_a_page_of_2000_cases(browser: Any, page: Path) -> None:
     visit = Visit(browser, page)
     assert visit.complaints == [] and {url.split(":")[0] for url in visit.asked} <= {"file", "data", "blob"}
     assert visit.page.text_content("h1") == "a <b>storm</b>" and visit.page.query_selector("h1 b") is None
@@ -80,7 +80,7 @@ def test_a_page_of_2000_cases(browser: Any, page: Path) -> None:  # noqa: F811
 
 
 @pytest.mark.long
-def test_a_phone_needs_no_scrolling_aside(browser: Any, page: Path) -> None:  # noqa: F811
+def test_a_phone_needs_no_scrolling_aside(browser: Any, page: Path) -> None:
     visit = Visit(browser, page, viewport={"width": 390, "height": 800})
     assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
     visit.context.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -25,8 +25,8 @@ from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.restart import zoning_of_today
 from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.zones.manager import Allowed, Change, DomainManager, Times, shares_asked
-from tests.inside import never_due
+from hybrid.zones.manager import Allowed, DomainManager, Times, shares_asked
+from tests.inside import calls_of, never_due
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -146,14 +146,7 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
     """
     sets = [*TOUCHDOWN, "time.duration=8", ZONES, "output.every=0.1"]
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*sets, friction] if friction else sets)
-    together = []
-
-    def joined_observation(observer, outputs):
-        together.append({output.line.s.size for output in outputs})
-        return of_observer(observer, outputs)
-
-    of_observer = Observer.joined_observation
-    monkeypatch.setattr(Observer, "joined_observation", joined_observation)
+    together = calls_of(monkeypatch, Observer, "joined_observation", lambda _, outs: {x.line.s.size for x in outs})
     once = hybrid.run(scene)
     assert max(map(len, together)) > 3 and len(together) < 0.1 * once.t.size
     anew = hybrid.run(scene)
@@ -176,13 +169,9 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         seabed={"z": -500, "stiffness": 5e3, "damping": 500}, time=(40.0, 0.2), mesh=32,
         model={"kind": "adaptive", "curvature_error": 0.03}, output={"every": 2, "points": 501, "errors": False}
     ))  # fmt: skip
-    changed, changes = [], RunZones._switch
-
-    def switch_line(self: RunZones, line: Any, how: Change, here: Any = None) -> None:
-        changed.append(how.same and self._run.lines[0].envelope.itself.on)
-        changes(self, line, how, here)
-
-    monkeypatch.setattr(RunZones, "_switch", switch_line)
+    changed = calls_of(
+        monkeypatch, RunZones, "_switch", lambda x, _, how, *__: how.same and x._run.lines[0].envelope.itself.on
+    )
     once = hybrid.run(scene)
     by_python = sum(changed)
     monkeypatch.setattr(CellChanges, "may_change", lambda *_: False)
@@ -254,14 +243,7 @@ def test_what_is_held_after_a_change_is_what_binding_would_give(monkeypatch: pyt
 
 def test_a_run_seldom_returns_from_compiled_code(short: hybrid.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only where zones change, a step fails or buffers are full; with a return for every change the run is the same."""
-    calls = []
-    goes = NetworkSteps.go
-
-    def go(self: NetworkSteps) -> int:
-        calls.append(self)
-        return goes(self)
-
-    monkeypatch.setattr(NetworkSteps, "go", go)
+    calls = calls_of(monkeypatch, NetworkSteps, "go")
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT)
     hybrid.run(scene)
     once = len(calls)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from hybrid.kernels.mesh.cell_errors import TAU, WAVES, know_new_nodes
 from hybrid.kernels.mesh.zone_step import read, watch_waves
 from hybrid.simulation.restart import zoning_of_today
 from hybrid.store.integrity import Tree
+from tests.simulation.bits import resumed
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHARE = 0.05
@@ -170,11 +172,11 @@ def test_new_nodes_begin_between_those_beside_them() -> None:
 # --- laying -----------------------------------------------------------------------------------------
 
 
-def laying(duration: float, model: object, cells: int) -> hybrid.Scene:
+def laying(duration: float, model: object, cells: int) -> dict[str, Any]:
     what = hybrid.load_scene(EXAMPLES / "laying.yaml").model_dump(exclude_unset=True, mode="json")
     output = {"errors": False, "points": 801, "every": 0.5}
     time = what["time"] | {"duration": duration}
-    return hybrid.validate_scene(what | {"model": model, "mesh": {"cells": cells}, "output": output, "time": time})
+    return what | {"model": model, "mesh": {"cells": cells}, "output": output, "time": time}
 
 
 FOLLOWING = {"kind": "adaptive", "curvature_error": SHARE}
@@ -197,14 +199,8 @@ def test_laying_keeps_its_share_at_the_held_end_and_its_pull() -> None:
 @pytest.mark.parametrize("cut, until", [(2.5, 5.0), (6.5, 8.0)])
 def test_laying_is_continued_to_the_last_bit(cut: float, until: float, tmp_path: Path) -> None:
     """While cells become shorter for waves; and while the ship's heave turns round, when it has been faster of late."""
-    whole = hybrid.run(laying(until, FOLLOWING, 32))
-    hybrid.run(laying(cut, FOLLOWING, 32), tmp_path / "r.h5").close()
-    more = hybrid.resume(tmp_path / "r.h5", until=until)
-    for name in ("position", "tension", "curvature", "work/zones"):
-        np.testing.assert_array_equal(more[name], whole[name], err_msg=name)
-    for mine, its in zip(more.mesh, whole.mesh, strict=True):
-        np.testing.assert_array_equal(mine.s, its.s)
-    at_ship = [int((more.mesh[k].s > 650.0).sum()) for k in (0, 5, 10)]
+    whole = resumed(laying(until, FOLLOWING, 32), tmp_path, cut)
+    at_ship = [int((whole.mesh[k].s > 650.0).sum()) for k in (0, 5, 10)]
     assert at_ship[0] < at_ship[1] < at_ship[2]  # at rest, after 2.5 s, after 5 s
 
 
