@@ -248,7 +248,7 @@ class Model:
     def loaded_ends(self) -> tuple[bool, bool]:
         """Whether there is a point load at the start, and at the end."""
         near = 1e-9 * self.length
-        start, end = (any(abs(x - s) < near for x in self.attached) for s in (0.0, self.length))
+        start, end = (any(abs(x - s) < near for x in self.attached) for s in self.line.s[[0, -1]].tolist())
         return start, end
 
     @property

@@ -46,16 +46,17 @@ class ComparisonRecorder:
     ) -> None:
         """Append outputs at the times (nb,), s, of the fields (nb, ...).  ResultError when one is not finite.
 
-        later: as of `Recorder.save_batch`; not kept.
+        later: as of `Recorder.save_batch`.
         """
         for name, value in values.items():
             finite = np.isfinite(value).reshape(len(times), -1).all(axis=1)
             if not finite.all():
                 raise ResultError(f"{name} is not finite at t = {times[np.argmin(finite)]:.9g} s")
         self.times += times.tolist()
-        share = sum((b - a for kind, a, b in zones if kind == "catenary"), 0.0) / zones[-1][2] if zones else 0.0
-        self._catenary += [share] * len(times)
-        self.rods |= {(a, b) for kind, a, b in zones if kind == "rod"}
+        for each in [zones, *later] if later else [zones] * len(times):
+            share = sum((b - a for kind, a, b in each if kind == "catenary"), 0.0) / each[-1][2] if each else 0.0
+            self._catenary.append(share)
+            self.rods |= {(a, b) for kind, a, b in each if kind == "rod"}
         self._keep(values)
 
     def recorded(self) -> Recorded | None:

@@ -345,9 +345,11 @@ class Recorder(Rows):
 
     def _copy(self, groups: Mapping[str, h5py.Group], file: h5py.File, at: Checkpoint) -> None:
         """Copy a result up to a checkpoint, without what is known only when all is done."""
-        names = {field.name for field in self._tables["/"]}
-        later = {x for x in names_in(groups[""], "errors") if x not in names}
-        copied(groups[""], file, at.rows, {*later, GROUP, BEFORE, *SLOTS})
+        later = {}  # errors but for those that are fields of the run
+        for name, each in self._every().items():
+            fields = {field.name for field in each._tables["/"]}
+            later[name] = {x for x in names_in(groups[name], "errors") if x not in fields}
+        copied(groups[""], file, at.rows, {*later[""], GROUP, BEFORE, *SLOTS})
         for group in self._tables:
             file.require_group(group)
         write_texts(file, {name: made(text) for name, text in self._texts.items()})
@@ -357,7 +359,7 @@ class Recorder(Rows):
         if self._parts:
             file.require_group(GROUP).attrs["order"] = list(self._parts)
         for name in self._parts:
-            copied(groups[name], file.create_group(f"{GROUP}/{name}"), of_part(name, at.rows), {"errors"})
+            copied(groups[name], file.create_group(f"{GROUP}/{name}"), of_part(name, at.rows), later[name])
 
     def _every(self) -> dict[str, Rows]:
         """This result, under no name, and those of the lines."""

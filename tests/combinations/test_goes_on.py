@@ -155,14 +155,21 @@ NETWORKS = {
     "two ropes over a sheave": tables_with(two_ropes(), {"time.duration": 0.4}),
     "paid out at its start to a weight": network_scene(
         {"ship": {"position": [0, 0, 0]}, "weight": {"initial_guess": [30, 0, -40], "mass": 20.0, "volume": 0.01}},
-        {"rope": line_between("ship", "weight", ROPE, mesh=10, connections={"start": {"payout": {"rate": 2.0}}})},
-        environment={"fluid": {"density": 1025.0, "current": [0.5, 0, 0]}}, time=(1.0, 0.02), output={"every": 0.1},
+        {
+            "rope": line_between(
+                "ship", "weight", ROPE, mesh=10, connections={"start": {"payout": {"rate": 2.0, "ramp": 0.1}}}
+            )
+        },
+        environment={"fluid": {"density": 1025.0, "current": [0.5, 0, 0]}},
+        time=(1.0, 0.02),
+        output={"every": 0.1},
     ),
     "errors, on a bed": network_scene(
         {"west": {"position": [0, 0, -20]}, "east": {"position": [45, 0, 0], "motion": HEAVES}},
         {"rope": line_between("west", "east", ROPE | {"length": 60.0}, mesh=20, model="rod")},
         environment={"fluid": {"density": 1025.0}, "seabed": {"z": -20, "stiffness": 1e4}},
-        time=(1.0, 0.02), output={"every": 0.1, "errors": True},
+        time=(1.0, 0.02),
+        output={"every": 0.1, "errors": True},
     ),
     "paid out fast": as_network(tables_with(scene_of("payout"), {END + ".payout": {"rate": 2.0, "ramp": 0.1}})),
 }

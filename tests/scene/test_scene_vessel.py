@@ -243,7 +243,9 @@ def test_angles_that_wrap_are_the_same_motion(tmp_path: Path) -> None:
 
 def test_rotation_vectors_and_angles_are_the_same_rotations() -> None:
     for angles in np.random.default_rng(3).uniform(-180, 180, (50, 3)):
-        assert Rotation.from_euler("xyz", angles, degrees=True).as_matrix() == pytest.approx(attitude(*angles), abs=1e-12)
+        assert Rotation.from_euler("xyz", angles, degrees=True).as_matrix() == pytest.approx(
+            attitude(*angles), abs=1e-12
+        )
     counted = continuous(np.array([[0, 0, 3.0], [0, 0, -3.0], [0, 0, 0.0], [0, 0, 1.0]]))
     assert counted[:, 2] == pytest.approx([3.0, 2 * np.pi - 3.0, 2 * np.pi, 2 * np.pi + 1.0])
 

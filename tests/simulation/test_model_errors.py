@@ -28,7 +28,7 @@ from hybrid.scene.root import LINE, in_full
 from hybrid.simulation.case import Case
 from hybrid.simulation.run_sample import RunSample, restored_sample
 from hybrid.store.integrity import pack, unpack
-from hybrid.store.stored_rows import MissingRows
+from hybrid.store.stored_rows import ComparisonRecorder, MissingRows
 from tests.said import line_of, said, texts_of
 from tests.scenes import cable_scene, pinned_at, system_of
 
@@ -507,3 +507,11 @@ def test_the_plan_says_what_a_slack_line_may_cost() -> None:
     plan = replace(hybrid.plan(open_, measure=False), seconds=8.0, most_seconds=19.0)
     said = " ".join(" ".join(plan_rows(open_, plan)).split())
     assert "about 8 s of CPU for all runs (up to 19 s if a line goes slack and becomes a rod" in said
+
+
+def test_each_output_that_is_kept_has_its_own_zones() -> None:
+    """Of outputs that are recorded together, too: whether bending is left out at any goes by them."""
+    kept = ComparisonRecorder()
+    kept.save_batch(np.arange(2.0), {}, [("rod", 0.0, 10.0)], [[("rod", 0.0, 4.0), ("catenary", 4.0, 10.0)]])
+    kept.save_batch(np.arange(2.0, 4.0), {}, [("catenary", 0.0, 10.0)])
+    assert kept.catenary.tolist() == [0.0, 0.6, 1.0, 1.0] and kept.rods == {(0.0, 10.0), (0.0, 4.0)}

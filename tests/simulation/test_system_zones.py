@@ -199,7 +199,9 @@ FOLLOWS = {"kind": "adaptive", "curvature_error": SHARE}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("model", [{"hold_time": 0.1}, {"hold_time": 0.1, "curvature_error": 0.05}], ids=["zones", "cells"])
+@pytest.mark.parametrize(
+    "model", [{"hold_time": 0.1}, {"hold_time": 0.1, "curvature_error": 0.05}], ids=["zones", "cells"]
+)
 def test_steps_that_follow_the_motion_go_by_zones_and_not_by_pauses(model: Tables, monkeypatch: Any) -> None:
     """A review that lets rods go bounds the next step at once, and not when Python has looked."""
     rope = {"length": 60.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100.0}

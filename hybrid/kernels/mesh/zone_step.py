@@ -494,10 +494,9 @@ def advance_zones(table):
         relax_arcs(line, state, zones)
         watch_waves(line, state, zones, clock.last_dt)
         zones.counts.cells_due = other_cells(line, job.sea, state, zones, clock.last_dt)
+    asks = zones.clock.highest_ratio > 1.0
+    if not asks and clock.now >= zones.clock.next_review:  # which may let rods go: the next step hangs on that
+        asks = job.review == 0 or call_review(job.review, job.review_table) == 0
     ramping = zones.counts.going or zones.counts.coming
     clock.allowed = zones.clock.ramp_step if ramping else zones.clock.steady_step
-    if zones.clock.highest_ratio > 1.0:
-        return 1
-    if clock.now >= zones.clock.next_review and (job.review == 0 or call_review(job.review, job.review_table) == 0):
-        return 1
-    return 1 if zones.counts.cells_due != 0 else 0
+    return 1 if asks or zones.counts.cells_due != 0 else 0
