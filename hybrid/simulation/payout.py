@@ -15,7 +15,7 @@ from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.paid_length import carry_layers, length_at
 from hybrid.kernels.reel.payout import end_payout, fit_line, lengthen, put_forces_on, remove_forces
-from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, energy_of, put_places
+from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, energy_of, place_reel
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
@@ -78,7 +78,7 @@ class PayingOut:
         numbers.spring = plan.cable.springs[plan.side]
         if plan.cable.vortices.size:
             numbers.lift = plan.cable.vortices[-plan.side, 0]
-        put_places(reel, self._nodes, material)
+        place_reel(reel, self._nodes, material)
         return reel
 
     def on(self, model: Model, length: float) -> Model:

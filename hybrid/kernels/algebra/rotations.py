@@ -252,6 +252,22 @@ def vector(row, o):
 
 
 @inner
+def matrix(row, o):
+    return stack(vector(row, o), vector(row, o + 3), vector(row, o + 6))
+
+
+@inner
+def put(row, o, x):
+    row[o], row[o + 1], row[o + 2] = x
+
+
+@inner
+def put_matrix(row, o, x):
+    for k in range(9):
+        row[o + k] = x[k]
+
+
+@inner
 def get3(A, i):
     return (A[i, 0], A[i, 1], A[i, 2])
 

@@ -202,8 +202,7 @@ def rotate_column(H, k):
 @inner
 def begin_columns(H, s):
     """The least-squares problem of a residual of length s, before the first product."""
-    for i in range(MOST_PRODUCTS + 1):
-        H[i, MOST_PRODUCTS + 2] = 0.0
+    H[: MOST_PRODUCTS + 1, MOST_PRODUCTS + 2] = 0.0
     H[0, MOST_PRODUCTS + 2] = s
 
 
@@ -517,15 +516,6 @@ def hold_points(line, contact):
             contact.shares[p, SLIP_WITHIN] += work
 
 
-@inner
-def rest_points(line, contact):
-    """Friction of a state in which no step is tried."""
-    for i in range(contact.x.shape[0]):
-        for k in range(4):
-            contact.x[i, k] = 0.0
-    hold_points(line, contact)
-
-
 # --- entry ----------------------------------------------------------------------------------------
 
 
@@ -608,9 +598,7 @@ def load_ends(ends, y, first, n, report):
 def push_ends(contact, n):
     """Forces of contact on the end nodes, 0 and n, into contact.y."""
     y = contact.y
-    for k in range(2):
-        for j in range(3):
-            y[k * n, j] = 0.0
+    y[0, :3] = y[n, :3] = 0.0
     for i in range(contact.counts.points):
         point = contact.points[i]
         p, q = int(point[P]), int(point[Q])
@@ -666,10 +654,11 @@ def contact_task(table):
     if phase == REST:
         numbers.keeps = -1.0
     find_points(line, ends, contact, farthest_from_mean(work.u))
-    if rubs and phase == REST:
-        rest_points(line, contact)
-    elif rubs:
-        find_spins(line, contact, job.clock, job.call[NEAR] != 0, old, new, work.u)
+    if rubs:
+        if phase == REST:
+            contact.x[:, :4] = 0.0
+        else:
+            find_spins(line, contact, job.clock, job.call[NEAR] != 0, old, new, work.u)
         hold_points(line, contact)
     if phase == FINISH and rubs:
         keep_grips(line, contact, contact.counts.points)

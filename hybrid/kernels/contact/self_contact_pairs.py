@@ -311,12 +311,6 @@ def largest_difference(move, p, q):
 
 
 @inner
-def samples_in_block(count):
-    """Sample points of a piece that are looked at together: all of few, else the root of their number."""
-    return count if count <= FEW else math.ceil(math.sqrt(count))
-
-
-@inner
 def is_beyond(kind, r, p, begin, end, q, reach):
     """Whether the part of piece p between two places on it is farther than `reach`, m, from piece q, however these lie."""
     a, c = spline_point(r, p, spline_weights(kind, p, begin)), spline_point(r, p, spline_weights(kind, p, end))
@@ -333,7 +327,7 @@ def is_beyond(kind, r, p, begin, end, q, reach):
 def next_sample(contact, p, q, g, reach):
     """The sample point of piece p from g on that may be within `reach`, m, of piece q; their number: none is."""
     kind, r, count = contact.kind, contact.at, contact.samples[p]
-    block = samples_in_block(count)
+    block = count if count <= FEW else math.ceil(math.sqrt(count))  # of sample points that are looked at together
     if block < count:
         while g < count and g % block == 0:
             if not is_beyond(kind, r, p, g / count, min(g + block, count) / count, q, reach):

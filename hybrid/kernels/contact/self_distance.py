@@ -360,15 +360,6 @@ def compare_cells(line, ends, before, state, itself, i, j):
 
 
 @inner
-def compare_leaves(line, ends, before, state, itself, a, b):
-    """All pairs of cells of two leaves, a before b or the same."""
-    n = line.h.shape[0]
-    for i in range(a * LEAF, min((a + 1) * LEAF, n)):
-        for j in range(max(b * LEAF, i + NEIGHBOURS + 1), min((b + 1) * LEAF, n)):
-            compare_cells(line, ends, before, state, itself, i, j)
-
-
-@inner
 def search(line, ends, before, state, itself):
     """The least clearance of the step from the positions `before` to a state, into itself.found, and what is asked."""
     tree, stack, found, width, ahead = itself.tree, itself.stack, itself.found, itself.width, itself.ahead
@@ -397,7 +388,10 @@ def search(line, ends, before, state, itself):
         if not box_distance(tree, a, b) - widest < within:
             continue
         if a >= leaves:
-            compare_leaves(line, ends, before, state, itself, a - leaves, b - leaves)
+            c, d, n = a - leaves, b - leaves, line.h.shape[0]
+            for i in range(c * LEAF, min((c + 1) * LEAF, n)):
+                for j in range(max(d * LEAF, i + NEIGHBOURS + 1), min((d + 1) * LEAF, n)):
+                    compare_cells(line, ends, before, state, itself, i, j)
             continue
         c, d = 2 * a, 2 * b
         if a == b:
@@ -458,9 +452,7 @@ def watch_itself(table):
     The states of the job have changed places after the step, as in kernels.run.network_run.
     """
     job = read(table)
-    state, before = job.old, job.new
-    if job.counts.parity:
-        state, before = before, state
+    state, before = (job.new, job.old) if job.counts.parity else (job.old, job.new)
     search(job.line, job.ends, before.r, state, job.itself)
     found, ahead = job.itself.found, job.itself.ahead
     asked = note_asked(found, ahead) if ahead.asked > 0.0 else 0

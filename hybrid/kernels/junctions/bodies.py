@@ -24,7 +24,10 @@ from hybrid.kernels.algebra.rotations import (
     log_rotation,
     mat_mat,
     mat_vec,
+    matrix,
     outer,
+    put,
+    put_matrix,
     scale,
     stack,
     sub,
@@ -85,22 +88,6 @@ WORK = 45
 # round-off of moments; one that is held as softly as 1e-4 of the stiffest converges by four digits an iteration still.
 SOFTEST = 1e-8
 VERTICAL = (0.0, 0.0, 1.0)
-
-
-@inner
-def put(row, o, x):
-    row[o], row[o + 1], row[o + 2] = x
-
-
-@inner
-def matrix(row, o):
-    return stack(vector(row, o), vector(row, o + 3), vector(row, o + 6))
-
-
-@inner
-def put_matrix(row, o, x):
-    for k in range(9):
-        row[o + k] = x[k]
 
 
 @inner

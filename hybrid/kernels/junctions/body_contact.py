@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import add, cross, get3, madd, mat_mat, mat_vec, mscale, msub, sub, vector
+from hybrid.kernels.algebra.rotations import add, cross, get3, madd, mat_mat, mat_vec, mscale, msub, put, sub, vector
 from hybrid.kernels.algebra.sparse_rows import factor_dense, substitute_dense
 from hybrid.kernels.junctions.bodies import FRAME, LINES, PLACE, SOFTEST, SPRING, U, V, W, X, matrix
 from hybrid.kernels.junctions.borders import (
@@ -45,7 +45,7 @@ from hybrid.kernels.junctions.borders import (
     read_network,
 )
 from hybrid.kernels.junctions.junctions import count_tensions, first_unknown
-from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, put_vector, row3, transposed
+from hybrid.kernels.laws.obstacles import force_of_obstacle, put_matrix, transposed
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import (
@@ -105,15 +105,15 @@ def carry_shape(sea, k, old, new, work):
     """Bring obstacle k of a line to where its body is at the end of the step."""
     c = add(vector(old, PLACE), vector(work, U))
     before, R = matrix(old, FRAME), matrix(new, FRAME)
-    put_vector(sea.carried, k, BEGAN, vector(old, PLACE))
-    put_vector(sea.carried, k, ENDED, c)
-    put_matrix(sea.carried, k, SWEEP, mat_mat(R, transposed(before)))
-    put_vector(sea.carried, k, SPEED, vector(new, V))
-    put_vector(sea.carried, k, TURNING, mat_vec(R, vector(new, W)))
-    put_matrix(sea.carried, k, TURNED, R)
-    put_vector(sea.obstacles, k, CENTRE, add(c, mat_vec(R, row3(sea.carried, k, OFFSET))))
-    put_vector(sea.obstacles, k, AXIS, mat_vec(R, row3(sea.carried, k, STILL_AXIS)))
-    put_vector(sea.obstacles, k, SIDE, mat_vec(R, row3(sea.carried, k, STILL_SIDE)))
+    put(sea.carried[k], BEGAN, vector(old, PLACE))
+    put(sea.carried[k], ENDED, c)
+    put_matrix(sea.carried[k], SWEEP, mat_mat(R, transposed(before)))
+    put(sea.carried[k], SPEED, vector(new, V))
+    put(sea.carried[k], TURNING, mat_vec(R, vector(new, W)))
+    put_matrix(sea.carried[k], TURNED, R)
+    put(sea.obstacles[k], CENTRE, add(c, mat_vec(R, vector(sea.carried[k], OFFSET))))
+    put(sea.obstacles[k], AXIS, mat_vec(R, vector(sea.carried[k], STILL_AXIS)))
+    put(sea.obstacles[k], SIDE, mat_vec(R, vector(sea.carried[k], STILL_SIDE)))
 
 
 @inner
@@ -186,7 +186,7 @@ def press_node(network, job, l, i, cv):
         job.found[0] += 1
         job.found[1 + slot] += 1
         row[OF_LINE], row[OF_NODE], row[OF_SLOT] = l, i, slot
-        rho = sub(x, row3(sea.carried, k, ENDED))
+        rho = sub(x, vector(sea.carried[k], ENDED))
         M = cross(rho, F)
         for j in range(3):
             job.wrench[slot, j] -= F[j]
@@ -202,13 +202,9 @@ def press_node(network, job, l, i, cv):
 @inner
 def press_bodies(network, job, cv):
     """Forces of contact of all lines on bodies, with what they change by."""
-    for j in range(job.found.shape[0]):
-        job.found[j] = 0
-    for slot in range(job.own.shape[0]):
-        for j in range(36):
-            job.own[slot, j] = 0.0
-        for j in range(6):
-            job.wrench[slot, j] = 0.0
+    job.found[:] = 0
+    job.own[:, :36] = 0.0
+    job.wrench[: job.own.shape[0], :6] = 0.0
     for l in range(network.tables.shape[0]):
         for i in range(read(network.tables[l]).line.s.shape[0]):
             press_node(network, job, l, i, cv)

@@ -257,8 +257,7 @@ def balance_of_start(row, a, turning, answer, f):
 def moment_of_end(k, a, answer, f):
     """Component a of the moment of end k on what it is clamped to, M_0 or -M_N, as a functional of its two blocks."""
     sign = 1.0 if k == 0 else -1.0
-    for j in range(FUNCTIONAL):
-        f[j] = 0.0
+    f[:FUNCTIONAL] = 0.0
     for j in range(3):
         by = sign * answer[BY_CHORD + 3 * a + j]
         f[1 + j], f[NEXT + 1 + j] = -by, by

@@ -161,9 +161,7 @@ def hand_over(l, job, network, cv):
     joints, seats, columns, parts = network.joints, network.seats, network.columns, network.parts
     gaps, answers, S = network.gaps, network.answers, network.S
     new, work, points = network.new, network.work, network.net.shape[0]
-    for r in range(RIGHT):
-        for c in range(HANDED):
-            S[r, c] = 0.0
+    S[:RIGHT, :HANDED] = 0.0
     start, end = joints[l, START], joints[l, END]
     n, X_, o, f = job.line.h.shape[0], job.work.X, network.first[l], network.functional
     starts, ends = turns(seats, l, START), turns(seats, l, END)
@@ -324,9 +322,7 @@ def assemble_junctions(network, m):
     """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over."""
     cv, ca = network.asked.scheme_cv, network.asked.scheme_ca
     tables, joints, net, A = network.tables, network.joints, network.net, network.A
-    for r in range(m):
-        for c in range(m + 1):
-            A[r, c] = 0.0
+    A[:m, : m + 1] = 0.0
     row, tensions, points = 0, count_tensions(joints), net.shape[0]
     for l in range(tables.shape[0]):
         start, end = joints[l, START], joints[l, END]
@@ -368,8 +364,7 @@ def gather_right_sides(network, m):
     tables, joints, seats, arms = network.tables, network.joints, network.seats, network.arms
     points = network.net.shape[0]
     S, G, A, row, tensions = network.S, network.G, network.A, 0, count_tensions(network.joints)
-    for r in range(m):
-        A[r, m] = 0.0
+    A[:m, m] = 0.0
     for l in range(tables.shape[0]):
         if joints[l, START] < 0 and joints[l, END] < 0:
             continue
@@ -454,12 +449,8 @@ def move_joints(job):
 def place_all(network):
     """Ends of all lines go to where their points and bodies are, from which no force is known yet."""
     given = network.asked.what == CORRECTION
-    for p in range(network.net.shape[0]):
-        for k in range(3):
-            network.net[p, k] = 0.0
-    for b in range(network.work.shape[0]):
-        for k in range(6):
-            network.work[b, LINES + k] = 0.0
+    network.net[:, :3] = 0.0
+    network.work[:, LINES : LINES + 6] = 0.0
     for l in range(network.tables.shape[0]):
         place_ends(l, read(network.tables[l]), network, given)
 
@@ -473,13 +464,6 @@ def add_pulls(network):
             if joint >= 0:
                 report, clamped = read(network.tables[l]).work.report, turns(network.seats, l, k)
                 add_pull(joint, report, k, network.arms[l, k], clamped, network.net, network.work)
-
-
-@inner
-def weigh_bodies(network):
-    """Forces on bodies beside those of lines."""
-    for b in range(network.work.shape[0]):
-        own_force(network.bodies[b], network.old[b], network.new[b], network.work[b])
 
 
 @inner
@@ -511,7 +495,8 @@ def join_lines(table):
     elif question == FORCE:
         add_pulls(network)
     elif question == BALANCE:
-        weigh_bodies(network)
+        for b in range(network.work.shape[0]):
+            own_force(network.bodies[b], network.old[b], network.new[b], network.work[b])
     elif question == BLOCK:
         assemble_junctions(network, m)
     elif question == HOLD:
@@ -531,23 +516,6 @@ def join_lines(table):
     return 1.0
 
 
-@inner
-def correct_torques(network):
-    """Corrections of lines with the torque through their catenary zones."""
-    for l in range(network.tables.shape[0]):
-        job = read(network.tables[l])
-        twist_zones(1, job, job.new, CORRECT, network.asked.scheme_cv)
-
-
-@inner
-def forget_torques(network):
-    """How lines answer to torques is found anew in every solution."""
-    for l in range(network.tables.shape[0]):
-        known = read(network.tables[l]).work.torsion.known
-        if known.shape[0] > 0:
-            known[0] = -1.0
-
-
 @kernel
 def twist_lines(table):
     """Answer for torques through catenary zones of lines (kernels.junctions.borders and kernels.march.zone_torque).
@@ -557,8 +525,11 @@ def twist_lines(table):
     """
     network = read_network(read_border(table).network)
     question = network.phase[0]
-    if question == FORGET:
-        forget_torques(network)
-    elif question == COUPLE:
-        correct_torques(network)
+    for l in range(network.tables.shape[0]):
+        job = read(network.tables[l])
+        known = job.work.torsion.known
+        if question == FORGET and known.shape[0] > 0:
+            known[0] = -1.0
+        elif question == COUPLE:
+            twist_zones(1, job, job.new, CORRECT, network.asked.scheme_cv)
     return 1.0

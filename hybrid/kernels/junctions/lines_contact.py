@@ -171,9 +171,7 @@ def find_pushes(one, pushes):
     """
     contact = one.contact
     y = contact.y
-    for i in range(y.shape[0]):
-        for j in range(4):
-            y[i, j] = 0.0
+    y[:, :4] = 0.0
     for within in (False, True):
         for k in range(contact.counts.points):
             row = contact.points[k]

@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
+from hybrid.kernels.laws.seabed import interval_within
 from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.state.report import LOST_WORK, STRETCH_ENERGY
 from hybrid.kernels.state.state import WORKING, blank_state, on_line
@@ -49,22 +50,9 @@ SHORT = 1e-3
 
 
 @inner
-def piece_of(table, first, last, column, x):
-    """The row of a table at which the piece begins that x lies in, or next to."""
-    low, high = first, last - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if table[middle, column] <= x:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inner
 def strain_at(table, first, last, T):
     """Strain at rest under T, its derivative (1/N), and the energy per length."""
-    j = piece_of(table, first, last, TENSION, T)
+    j = interval_within(table[:, TENSION], first, last - 1, T)
     c = (table[j + 1, STRAIN] - table[j, STRAIN]) / (table[j + 1, TENSION] - table[j, TENSION])
     more = T - table[j, TENSION]
     return table[j, STRAIN] + c * more, c, table[j, ENERGY] + 0.5 * c * more * (T + table[j, TENSION])
@@ -73,7 +61,7 @@ def strain_at(table, first, last, T):
 @inner
 def tension_at(table, first, last, strain):
     """Tension at rest at a strain."""
-    j = piece_of(table, first, last, STRAIN, strain)
+    j = interval_within(table[:, STRAIN], first, last - 1, strain)
     c = (table[j + 1, TENSION] - table[j, TENSION]) / (table[j + 1, STRAIN] - table[j, STRAIN])
     return table[j, TENSION] + c * (strain - table[j, STRAIN])
 
@@ -288,14 +276,8 @@ def is_dynamic(line, i):
 
 
 @inner
-def strain_and_energy(line, state, i):
-    """Strain of cell i under its tension, of which nothing is of damping, and its energy per length, J/m."""
-    return strain_and_energy_at(line, state, i, state.T[i])
-
-
-@inner
 def strain_and_energy_at(line, state, i, T):
-    """The same under a tension T (N) that is not the state's."""
+    """Strain of cell i under a tension T, N, of which nothing is of damping, and its energy per length, J/m."""
     if not has_law(line, i):
         return line.ck[i] * T, 0.5 * line.ck[i] * T * T
     return strain_of_law(line, state, i, T)
@@ -326,14 +308,16 @@ def softness_of_damping(line, state, i, late):
     first, last = int(line.law[i, FIRST]), int(line.law[i, LAST])
     strain, c, _ = strain_at(line.law_table, first, last, T)
     elastic = tension_at(line.law_table, first, last, strain - late)
-    one = piece_of(line.law_table, first, last, TENSION, T) == piece_of(line.law_table, first, last, TENSION, elastic)
+    one = interval_within(line.law_table[:, TENSION], first, last - 1, T) == interval_within(
+        line.law_table[:, TENSION], first, last - 1, elastic
+    )
     return c if one or not abs(T - elastic) > NO_DAMPING * abs(T) else late / (T - elastic)
 
 
 @inner
 def stretch_work(line, state, c):
     """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
-    strain, energy = strain_and_energy(line, state, c)
+    strain, energy = strain_and_energy_at(line, state, c, state.T[c])
     return state.T[c] * (1.0 + strain) - energy
 
 
@@ -345,7 +329,7 @@ def stretch_energy(line, state):
     """
     total = 0.0
     for i in range(line.h.shape[0]):
-        strain, stored = strain_and_energy(line, state, i)
+        strain, stored = strain_and_energy_at(line, state, i, state.T[i])
         total += line.h[i] * stored
         if line.tension_twist.shape[0] > 0:
             total += energy_by_twist(line, state, i, strain)

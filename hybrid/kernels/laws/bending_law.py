@@ -58,7 +58,6 @@ from hybrid.kernels.algebra.rotations import (
     scale,
     vec_mat,
 )
-from hybrid.kernels.laws.axial_law import piece_of
 from hybrid.kernels.laws.element import (
     bending,
     damped_bending,
@@ -69,6 +68,7 @@ from hybrid.kernels.laws.element import (
     swivel,
     turns_freely,
 )
+from hybrid.kernels.laws.seabed import interval_within
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import AXIAL_LAW, BENDING_LAW, BENDING_SLIP, LOST_WORK
 from hybrid.kernels.state.state import blank_state, no_ends, no_work, on_line
@@ -348,20 +348,15 @@ SMALL = 1e-6
 
 
 @inner
-def slope_of(table, j):
-    """Curvature by moment, 1/(N m2), of the piece that begins at row j."""
-    return (table[j + 1, CURVATURE] - table[j, CURVATURE]) / (table[j + 1, TABLE_MOMENT] - table[j, TABLE_MOMENT])
-
-
-@inner
 def half_cell(table, law, i, half, M):
     """Bend (rad) of half a cell under the moment M, its slope (rad per N m), its energy (J), and where its piece ends."""
     length = law[i, half + HALF_A]
     if not length > 0.0:
         return 0.0, 0.0, 0.0, math.inf
     first, last = int(law[i, half + FIRST_A]), int(law[i, half + LAST_A])
-    j = piece_of(table, first, last, TABLE_MOMENT, M)
-    c, more = slope_of(table, j), M - table[j, TABLE_MOMENT]
+    j = interval_within(table[:, TABLE_MOMENT], first, last - 1, M)
+    c = (table[j + 1, CURVATURE] - table[j, CURVATURE]) / (table[j + 1, TABLE_MOMENT] - table[j, TABLE_MOMENT])
+    more = M - table[j, TABLE_MOMENT]
     end = table[j + 1, TABLE_MOMENT] if j + 2 < last else math.inf
     energy = table[j, ENERGY] + 0.5 * c * more * (M + table[j, TABLE_MOMENT])
     return length * (table[j, CURVATURE] + c * more), length * c, length * energy, end
@@ -503,19 +498,14 @@ def direction_of_bend(Ra, Rb, kb, k0):
 @inner
 def bending_at(line, i, Ra, Rb, kb, k0):
     """As `element.bending`, of the element at node i, by its table if it has one, and with layers that slip."""
-    M, C = bending_by_table(line, i, Ra, Rb, kb, k0)
+    if has_bend_law(line, i):
+        M, C = bending_of_law(line, i, Ra, Rb, kb, k0)
+    else:
+        M, C = bending(Ra, Rb, kb, k0)
     if line.bits & BENDING_SLIP:
         m, c = slip_moment(line, i, Ra, Rb, k0)
         M, C = add(M, m), madd(C, c)
     return M, C
-
-
-@inner
-def bending_by_table(line, i, Ra, Rb, kb, k0):
-    """As `element.bending`, of the element at node i, by its table if it has one."""
-    if not has_bend_law(line, i):
-        return bending(Ra, Rb, kb, k0)
-    return bending_of_law(line, i, Ra, Rb, kb, k0)
 
 
 @linked_kernel(on_line(0, Z9, Z9, Z3, Z3), (Z3, Z9))
@@ -530,20 +520,15 @@ def bending_of_law(line, i, Ra, Rb, kb, k0):
 @inner
 def damped_bending_at(line, i, Ra, Rb, kb, k0, tau, wa, wb):
     """As `element.damped_bending`, likewise: the damping is that of the stiffness without bend and without layers."""
-    M, C, Cd, loss = damped_bending_by_table(line, i, Ra, Rb, kb, k0, tau, wa, wb)
+    kd = scale(tau, kb)
+    if has_bend_law(line, i):
+        M, C, Cd, loss = damped_bending_of_law(line, i, Ra, Rb, kb, kd, k0, wa, wb)
+    else:
+        M, C, Cd, loss = damped_bending(Ra, Rb, kb, kd, k0, wa, wb)
     if line.bits & BENDING_SLIP:
         m, c = slip_moment(line, i, Ra, Rb, k0)
         M, C = add(M, m), madd(C, c)
     return M, C, Cd, loss
-
-
-@inner
-def damped_bending_by_table(line, i, Ra, Rb, kb, k0, tau, wa, wb):
-    """As `element.damped_bending`, likewise."""
-    kd = scale(tau, kb)
-    if not has_bend_law(line, i):
-        return damped_bending(Ra, Rb, kb, kd, k0, wa, wb)
-    return damped_bending_of_law(line, i, Ra, Rb, kb, kd, k0, wa, wb)
 
 
 @linked_kernel(on_line(0, Z9, Z9, Z3, Z3, Z3, Z3, Z3), (Z3, Z9, Z9, 0.0))

@@ -25,11 +25,10 @@ from typing import NamedTuple
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.element import Rates
-from hybrid.kernels.laws.node_forces import Z3, Water, body_water
+from hybrid.kernels.laws.node_forces import body_water, water_at
 from hybrid.kernels.laws.seabed import bed_under, borne_length, contact, pressure
-from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.report import BODIES, CONTACT_FORCE, FLOW, FORCE_A, NET_A, SEABED, SOIL, SURFACE, WAVES
+from hybrid.kernels.state.report import BODIES, CONTACT_FORCE, FORCE_A, NET_A, SEABED, SOIL, SURFACE
 
 HALVINGS = 52  # of the last cell, which find where a rod leaves the bed: to round-off, as derivatives need it
 MOST_BRACKETS = 60  # of Ridders' method, for the same of all lines: 5 in the mean, as many where hardly anything lies
@@ -47,15 +46,7 @@ def body_force(line, sea, i, x, state):
     v, vd = get3(state.v, i), get3(state.vd, i)
     F = sub((0.0, 0.0, line.point_lift[i]), scale(line.point_mass[i], vd))
     if line.bits & BODIES:
-        U, U1, w, b, af, eta = Z3, Z3, v, vd, Z3, sea.surface
-        if line.bits & FLOW:
-            U, U1 = current_at(sea.z, sea.current, sea.now[1], x[2])
-            w = sub(w, U)
-        if line.bits & WAVES:
-            af = (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
-            w, b = sub(w, get3(sea.flow, i)), sub(b, af)
-            eta += sea.flow[i, 6]
-        f, _, _ = body_water(line, i, Water(x[2], eta, w, U1, b, af), v, Rates(0.0, 0.0))
+        f, _, _ = body_water(line, i, water_at(line, sea, i, x[2], v, vd), v, Rates(0.0, 0.0))
         F = add(F, f)
     if line.bits & SEABED and line.footing[i] > 0.0:
         n, p = bed_under(sea, x)

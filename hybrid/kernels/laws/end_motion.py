@@ -17,6 +17,7 @@ import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, hat, mat_mat, mat_vec, scale, stack, transport
 from hybrid.kernels.laws.element import chord
+from hybrid.kernels.laws.seabed import interval_within
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import NOT_ON_BODY, PLACE_THERE, RIDES, SEAT_THERE, TURNS_FREELY
 
@@ -84,19 +85,6 @@ def harmonics_at(t, k, first, moves):
 
 
 @inner
-def knot_before(t, k, moves):
-    """Row of the cubic of end k's file that holds t; the first one before the file begins."""
-    a, b = moves.file[k, 0], moves.file[k, 1]
-    while b - a > 1:
-        m = (a + b) // 2
-        if moves.knots[m] <= t:
-            a = m
-        else:
-            b = m
-    return a
-
-
-@inner
 def cubic(x, c):
     """Value and derivative at x of the cubic with coefficients c (4,), highest power first."""
     return c[3] + x * (c[2] + x * (c[1] + x * c[0])), c[2] + x * (2.0 * c[1] + x * 3.0 * c[0])
@@ -127,7 +115,7 @@ def position_at(t, k, moves, sea):
     base = (moves.position[k, 0], moves.position[k, 1], moves.position[k, 2])
     if moves.file[k, 1] > moves.file[k, 0]:
         when = min(t, moves.knots[moves.file[k, 1]])
-        shift, v = cubics_at(when, knot_before(when, k, moves), 0, moves)
+        shift, v = cubics_at(when, interval_within(moves.knots, moves.file[k, 0], moves.file[k, 1], when), 0, moves)
         shift, v = blended(t, k, moves, shift, v)
         return add(base, shift), v
     shift, v = harmonics_at(t, k, 0.0, moves)
@@ -226,7 +214,7 @@ def frame_at(t, k, moves):
     if moves.prescribed[k, 1]:
         if moves.file[k, 1] > moves.file[k, 0]:
             last = min(when, moves.knots[moves.file[k, 1]])
-            v, rate = cubics_at(last, knot_before(last, k, moves), 3, moves)
+            v, rate = cubics_at(last, interval_within(moves.knots, moves.file[k, 0], moves.file[k, 1], last), 3, moves)
             v, rate = blended(when, k, moves, v, rate)
             turn, spin = turn_by_vector(v, rate)
         else:
@@ -275,12 +263,8 @@ def load_at(t, load, rows):
     b -= 1
     if t >= rows[b, 0]:
         return rows[b, 1], rows[b, 2], rows[b, 3]
-    while b - a > 1:
-        m = (a + b) // 2
-        if rows[m, 0] <= t:
-            a = m
-        else:
-            b = m
+    a = interval_within(rows[:, 0], a, b, t)
+    b = a + 1
     x = (t - rows[a, 0]) / (rows[b, 0] - rows[a, 0])
     y = 1.0 - x
     return y * rows[a, 1] + x * rows[b, 1], y * rows[a, 2] + x * rows[b, 2], y * rows[a, 3] + x * rows[b, 3]
@@ -358,7 +342,8 @@ def turn_of_file(a, b, k, moves):
     last, grown = moves.file[k, 1], rise(b, moves.ramp[k])[0]
     more = grown - rise(a, moves.ramp[k])[0]  # of a ramp, which turns it as well, by no more than the largest vector
     a, b = min(a, moves.knots[last]), min(b, moves.knots[last])
-    row, until, way = knot_before(a, k, moves), knot_before(b, k, moves), 0.0
+    first, last = moves.file[k, 0], moves.file[k, 1]
+    row, until, way = interval_within(moves.knots, first, last, a), interval_within(moves.knots, first, last, b), 0.0
     while row < until:
         way += way_of_cubics(a, moves.knots[row + 1], row, moves)
         row += 1

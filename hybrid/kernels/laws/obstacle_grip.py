@@ -26,23 +26,17 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, matrix, scale, sub, vector
 from hybrid.kernels.laws.obstacles import (
     carry_obstacles,
     grip,
-    half_cell,
-    meets,
     normal_force,
-    reach_of,
-    row3,
-    row9,
-    surface_velocity,
     swept,
     transposed,
     way_along,
     way_with,
 )
-from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, is_far, surface
+from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, surface
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import (
     ALGORITHMIC,
@@ -57,7 +51,6 @@ from hybrid.kernels.state.report import (
     MU,
     OBSTACLE_WORK,
     OFFSET,
-    ONSET_OF,
     RIDES,
     ROLLED,
     ROLLED_BEFORE,
@@ -79,34 +72,12 @@ from hybrid.kernels.state.state import ROWS, blank_state, in_sea, no_sea
 # --- obstacles ---------------------------------------------------------------------------------
 
 
-@inner
-def pressed(line, sea, k, i, x, state):
-    """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, curvature."""
-    reach = reach_of(sea, k, i, state.e)
-    if is_far(sea, k, x, reach):
-        return 0.0, Z3, (0.0, Z3, 0.0)
-    d, n, curved = surface(sea, k, x)
-    if d > reach:
-        return 0.0, n, curved
-    v, moves = state.v, line.moved.shape[0] > 0
-    vi = get3(v, i)
-    if moves:
-        vi = sub(vi, surface_velocity(sea.carried, k, x))
-    p, pd, N = 0.5 * sea.obstacles[k, ONSET_OF] - d, -dot(n, vi), 0.0
-    if i > 0 and meets(line, sea, moves, k, i - 1):
-        before = scale(-1.0, get3(state.e, i - 1))
-        N += half_cell(line, sea, k, i - 1, x, p, pd, before, get3(v, i - 1), 0.0)[0]
-    if i < line.h.shape[0] and meets(line, sea, moves, k, i):
-        N += half_cell(line, sea, k, i, x, p, pd, get3(state.e, i), get3(v, i + 1), 0.0)[0]
-    return N, n, curved
-
-
 @linked_kernel(in_sea(blank_state(1), 0), 0.0)
 def pressure_of_obstacles(line, sea, state, i):
     """Force per length (N/m) of all obstacles across node i, over its half cells."""
-    x, F, length = get3(state.r, i), Z3, 0.0
+    x, F, length, moves = get3(state.r, i), Z3, 0.0, line.moved.shape[0] > 0
     for k in range(sea.obstacles.shape[0]):
-        N, n, _ = pressed(line, sea, k, i, x, state)
+        N, _, n, _, _, _, _ = normal_force(line, sea, moves, k, i, x, state.v, state.e, 0.0)
         if N != 0.0:
             F = add(F, scale(N, n))
     if i > 0:
@@ -122,14 +93,14 @@ def grip_obstacles(line, sea, u, state, was, now):
 
     u: (N+1, 3) m, displacements of the nodes in the step.
     """
-    rows = sea.obstacles
+    rows, moves = sea.obstacles, line.moved.shape[0] > 0
     for i in range(u.shape[0]):
         x = get3(state.r, i)
         for k in range(rows.shape[0]):
-            N, n, curved = pressed(line, sea, k, i, x, state)
+            N, _, n, curved, _, _, _ = normal_force(line, sea, moves, k, i, x, state.v, state.e, 0.0)
             f, q = scale(N, n), Z3
             if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
-                t = way_along(sea.carried, k, row3(was, i, EACH * k), x, get3(u, i))
+                t = way_along(sea.carried, k, vector(was[i], EACH * k), x, get3(u, i))
                 rub, _, _, q = grip(t, n, gradient_of_normal(curved, n), N, rows[k, MU], rows[k, SLIP])
                 f = add(f, rub)
             for j in range(3):
@@ -139,7 +110,7 @@ def grip_obstacles(line, sea, u, state, was, now):
 @inner
 def mean_force(old, new, i, at):
     """Mean over a step of a force in a row of State.grip."""
-    a, b = row3(old.grip, i, at + FORCE), row3(new.grip, i, at + FORCE)
+    a, b = vector(old.grip[i], at + FORCE), vector(new.grip[i], at + FORCE)
     return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
@@ -148,7 +119,7 @@ def normals_of_step(sea, k, x, u):
     """Normals of obstacle k where a node was before the step, and where it is, at x after the displacement u."""
     _, before, _ = surface(sea, k, swept(sea.carried, k, sub(x, u)))
     _, after, _ = surface(sea, k, x)
-    return mat_vec(transposed(row9(sea.carried, k, SWEEP)), before), after
+    return mat_vec(transposed(matrix(sea.carried[k], SWEEP)), before), after
 
 
 @linked_kernel(lambda: (no_sea(1), blank_state(1), blank_state(1), ROWS, np.zeros(1)))
@@ -156,7 +127,7 @@ def book_obstacles(sea, old, new, u, report):
     """Work of obstacles in a step: what they push by as they move, and along and across their normals beside that."""
     for i in range(u.shape[0]):
         for k in range(sea.obstacles.shape[0]):
-            f0, f1 = row3(old.grip, i, EACH * k + FORCE), row3(new.grip, i, EACH * k + FORCE)
+            f0, f1 = vector(old.grip[i], EACH * k + FORCE), vector(new.grip[i], EACH * k + FORCE)
             if dot(f0, f0) + dot(f1, f1) == 0.0:
                 continue
             x, ui = get3(new.r, i), get3(u, i)
@@ -174,7 +145,7 @@ def wrench_on(state, k, place):
     """Force (N) of the line on obstacle k, and moment (N m) about a place."""
     force, moment = Z3, Z3
     for i in range(state.r.shape[0]):
-        f = row3(state.grip, i, EACH * k + FORCE)
+        f = vector(state.grip[i], EACH * k + FORCE)
         if f[0] != 0.0 or f[1] != 0.0 or f[2] != 0.0:
             force, moment = sub(force, f), sub(moment, cross(sub(get3(state.r, i), place), f))
     return force, moment
@@ -189,9 +160,9 @@ def sample_obstacles(sea, old, new, t, x, row, at):
     for k in range(new.sheave.shape[0]):
         sea.carried[k, ROLLED] = new.sheave[k, ANGLE]
     for k in range(sea.carried.shape[0]):
-        place = row3(sea.carried, k, ENDED)
+        place = vector(sea.carried[k], ENDED)
         if sea.carried[k, RIDES] != 0.0:  # the middle of the shape
-            place = add(place, mat_vec(row9(sea.carried, k, TURNED), row3(sea.carried, k, OFFSET)))
+            place = add(place, mat_vec(matrix(sea.carried[k], TURNED), vector(sea.carried[k], OFFSET)))
         force, moment = wrench_on(new, k, place)
         if x < 1.0:
             f, m = wrench_on(old, k, place)
@@ -246,7 +217,7 @@ def add_to_row(rows, i, part, x):
 def moments(line, sea, r, u, state, k, b, q, cv):
     """M of sheave k and its derivative by phi; b: (N+1, 5) gets - p, q: (N+1, 5) the derivative of M by the places."""
     moment = slope = 0.0
-    axis, last = mat_vec(row9(sea.carried, k, TURNED), row3(sea.carried, k, STILL_AXIS)), u.shape[0] - 1
+    axis, last = mat_vec(matrix(sea.carried[k], TURNED), vector(sea.carried[k], STILL_AXIS)), u.shape[0] - 1
     for i in range(last + 1):
         for j in range(5):
             b[i, j] = q[i, j] = 0.0
@@ -254,8 +225,8 @@ def moments(line, sea, r, u, state, k, b, q, cv):
         x = add(get3(r, i), get3(u, i))
         N, _, n, _, dN, before, after = normal_force(line, sea, True, k, i, x, state.v, state.e, cv)
         if N > 0.0:
-            t = way_along(sea.carried, k, row3(sea.grip, i, EACH * k), x, get3(u, i))
-            tau = cross(axis, sub(x, row3(sea.carried, k, ENDED)))
+            t = way_along(sea.carried, k, vector(sea.grip[i], EACH * k), x, get3(u, i))
+            tau = cross(axis, sub(x, vector(sea.carried[k], ENDED)))
             g, p = friction_by_turn(t, n, N, sea.obstacles[k, MU], sea.obstacles[k, SLIP], tau)
             by_force = -dot(tau, g)
             moment += by_force * N

@@ -34,7 +34,23 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, madd, mat_mat, mat_vec, mscale, outer, scale, sub
+from hybrid.kernels.algebra.rotations import (
+    add,
+    cross,
+    dot,
+    get3,
+    madd,
+    mat_mat,
+    mat_vec,
+    matrix,
+    mscale,
+    outer,
+    put,
+    put_matrix,
+    scale,
+    sub,
+    vector,
+)
 from hybrid.kernels.laws.end_motion import (
     driven_frame,
     driven_position,
@@ -102,33 +118,6 @@ PUSH = False, Z3, Z9, Z9, Z9  # an answer of `obstacle_forces`
 
 
 @inner
-def row3(table, k, at):
-    """Three numbers of a row."""
-    return table[k, at], table[k, at + 1], table[k, at + 2]
-
-
-@inner
-def row9(table, k, at):
-    """Nine numbers of a row."""
-    a, b, c = row3(table, k, at), row3(table, k, at + 3), row3(table, k, at + 6)
-    return a + b + c
-
-
-@inner
-def put_vector(table, k, at, x):
-    """Write a vector into a row."""
-    for j in range(3):
-        table[k, at + j] = x[j]
-
-
-@inner
-def put_matrix(table, k, at, R):
-    """Write a matrix into a row."""
-    for j in range(9):
-        table[k, at + j] = R[j]
-
-
-@inner
 def transposed(R):
     """The transpose of a matrix."""
     return R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8]
@@ -138,7 +127,7 @@ def transposed(R):
 def pose_at(t, k, sea, rolled):
     """c, v, R without spin, R, w of obstacle k at t (s); rolled: angle (rad) of one that turns freely."""
     moves = sea.courses
-    x, v = row3(moves.position, k, 0), (0.0, 0.0, 0.0)
+    x, v = vector(moves.position[k], 0), (0.0, 0.0, 0.0)
     if moves.prescribed[k, 0]:
         x, v = position_at(t, k, moves, sea)
     R, w = frame_at(t, k, moves)
@@ -147,7 +136,7 @@ def pose_at(t, k, sea, rolled):
         R, w = driven_frame(t, k, moves)
     rate, ramp, whole = sea.carried[k, RATE], sea.carried[k, RAMP], R
     if rate != 0.0:
-        a = row3(sea.carried, k, STILL_AXIS)
+        a = vector(sea.carried[k], STILL_AXIS)
         angle = t
         if ramp > 0.0:
             angle = rise_integral(t, ramp)
@@ -155,7 +144,7 @@ def pose_at(t, k, sea, rolled):
         whole = mat_mat(R, spun)
         w = add(w, scale(rate * rise(t, ramp)[0], mat_vec(R, a)))
     if sea.carried[k, INERTIA] > 0.0:
-        a = row3(sea.carried, k, STILL_AXIS)
+        a = vector(sea.carried[k], STILL_AXIS)
         spun, _ = turn_by_vector(scale(rolled, a), (0.0, 0.0, 0.0))
         whole = mat_mat(R, spun)
         w = add(w, scale(sea.carried[k, ROLLING], mat_vec(R, a)))
@@ -177,34 +166,27 @@ def carry_obstacles(begin, end, sea):
             before = sea.carried[k, ROLLED_BEFORE]
         c0, _, _, R0, _ = pose_at(max(begin, 0.0), k, sea, before)
         c, v, bare, R, w = pose_at(end, k, sea, rolled)
-        put_vector(sea.carried, k, BEGAN, c0)
-        put_vector(sea.carried, k, ENDED, c)
-        put_matrix(sea.carried, k, SWEEP, mat_mat(R, transposed(R0)))
-        put_vector(sea.carried, k, SPEED, v)
-        put_vector(sea.carried, k, TURNING, w)
-        put_matrix(sea.carried, k, TURNED, R)
-        put_vector(sea.obstacles, k, PLACE, c)
-        put_vector(sea.obstacles, k, AXIS, mat_vec(bare, row3(sea.carried, k, STILL_AXIS)))
-        put_vector(sea.obstacles, k, SIDE, mat_vec(bare, row3(sea.carried, k, STILL_SIDE)))
+        put(sea.carried[k], BEGAN, c0)
+        put(sea.carried[k], ENDED, c)
+        put_matrix(sea.carried[k], SWEEP, mat_mat(R, transposed(R0)))
+        put(sea.carried[k], SPEED, v)
+        put(sea.carried[k], TURNING, w)
+        put_matrix(sea.carried[k], TURNED, R)
+        put(sea.obstacles[k], PLACE, c)
+        put(sea.obstacles[k], AXIS, mat_vec(bare, vector(sea.carried[k], STILL_AXIS)))
+        put(sea.obstacles[k], SIDE, mat_vec(bare, vector(sea.carried[k], STILL_SIDE)))
 
 
 @inner
 def surface_velocity(carried, k, x):
     """Velocity (m/s) of what goes with obstacle k at x, at the end of the step."""
-    return add(row3(carried, k, SPEED), cross(row3(carried, k, TURNING), sub(x, row3(carried, k, ENDED))))
+    return add(vector(carried[k], SPEED), cross(vector(carried[k], TURNING), sub(x, vector(carried[k], ENDED))))
 
 
 @inner
 def swept(carried, k, x):
     """Where a point that goes with obstacle k has come in the step from x."""
-    return add(row3(carried, k, ENDED), mat_vec(row9(carried, k, SWEEP), sub(x, row3(carried, k, BEGAN))))
-
-
-@inner
-def unswept(carried, k, x):
-    """Where a point that goes with obstacle k has come from in the step to x."""
-    R = transposed(row9(carried, k, SWEEP))
-    return add(row3(carried, k, BEGAN), mat_vec(R, sub(x, row3(carried, k, ENDED))))
+    return add(vector(carried[k], ENDED), mat_vec(matrix(carried[k], SWEEP), sub(x, vector(carried[k], BEGAN))))
 
 
 @inner
@@ -215,7 +197,8 @@ def way_with(carried, k, x, u):
     under a node at rest.
     """
     x0 = sub(x, u)
-    return scale(0.5, add(sub(swept(carried, k, x0), x0), sub(x, unswept(carried, k, x))))
+    back = mat_vec(transposed(matrix(carried[k], SWEEP)), sub(x, vector(carried[k], ENDED)))
+    return scale(0.5, add(sub(swept(carried, k, x0), x0), sub(x, add(vector(carried[k], BEGAN), back))))
 
 
 @inner
@@ -225,7 +208,7 @@ def way_along(carried, k, q, x, u):
     Its travel q before the step, which turns with the obstacle, and its motion against the obstacle since; x: where it
     is, u: its displacement in the step.
     """
-    return add(mat_vec(row9(carried, k, SWEEP), q), sub(x, swept(carried, k, sub(x, u))))
+    return add(mat_vec(matrix(carried[k], SWEEP), q), sub(x, swept(carried, k, sub(x, u))))
 
 
 @inner
@@ -277,7 +260,7 @@ def half_cell(line, sea, k, c, x, p, pd, e, v, cv):
     f, f0, f1, g0, g1 = contact(p, po, pd, -dot(m, v), line.h[c], rows[k, STIFFNESS], rows[k, DAMPING], o)
     slope = scale(-(f1 + cv * g1), m)
     if moves:
-        slope = add(slope, scale(g1, cross(m, row3(sea.carried, k, TURNING))))
+        slope = add(slope, scale(g1, cross(m, vector(sea.carried[k], TURNING))))
     if g1 != 0.0:
         slope = sub(slope, scale(g1, bent(curved, m, v)))
     return f, f0, g0, slope
@@ -331,7 +314,7 @@ def normal_force(line, sea, moves, k, i, x, v, e, cv):
         turned += g0
     dN = add(dN, scale(-DN, n))
     if moves:
-        dN = add(dN, scale(turned, cross(n, row3(sea.carried, k, TURNING))))
+        dN = add(dN, scale(turned, cross(n, vector(sea.carried[k], TURNING))))
     return N, N != 0.0 or DN != 0.0, n, curved, dN, L, R
 
 
@@ -344,7 +327,7 @@ def force_of_obstacle(line, sea, k, i, x, u, v, e, cv):
         K = gradient_of_normal(curved, n)
         F, D = scale(N, n), mscale(N, K)
         if line.bits & FRICTION and sea.obstacles[k, MU] > 0.0 and N > 0.0:
-            t = way_along(sea.carried, k, row3(sea.grip, i, 6 * k), x, get3(u, i))
+            t = way_along(sea.carried, k, vector(sea.grip[i], 6 * k), x, get3(u, i))
             f, g, Df, _ = grip(t, n, K, N, sea.obstacles[k, MU], sea.obstacles[k, SLIP])
             F, D, slope = add(F, f), madd(D, Df), add(n, g)
         D = madd(D, madd(outer(slope, dN), madd(outer(slope, L), outer(slope, R))))
@@ -372,7 +355,7 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
         F, D = add(F, scale(N, n)), madd(D, mscale(N, K))
         if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
             if moves:
-                t = way_along(sea.carried, k, row3(sea.grip, i, 6 * k), x, get3(u, i))
+                t = way_along(sea.carried, k, vector(sea.grip[i], 6 * k), x, get3(u, i))
             f, g, Df, _ = grip(t, n, K, N, rows[k, MU], rows[k, SLIP])
             F, D, slope = add(F, f), madd(D, Df), add(n, g)
             if not moves:

@@ -73,13 +73,18 @@ HEIGHTS = 4  # numbers of a point of the grid: z, zx, zy, zxy
 @inner
 def interval(knots, x):
     """The interval of rising knots that x lies in, or is nearest to."""
-    low, high = 0, knots.shape[0] - 1
+    return interval_within(knots, 0, knots.shape[0] - 1, x)
+
+
+@inner
+def interval_within(knots, low, high, x):
+    """As `interval`, of those from knot `low` to knot `high`."""
     while high - low > 1:
         middle = (low + high) // 2
-        if x < knots[middle]:
-            high = middle
-        else:
+        if knots[middle] <= x:
             low = middle
+        else:
+            high = middle
     return low
 
 
@@ -311,8 +316,7 @@ def depth_of(sea, r, i):
 def normal_forces(line, sea, r, N):
     """Force N (N+1,) N of the bed along its normal on the nodes of a line at rest."""
     o = sea.onset
-    for i in range(N.shape[0]):
-        N[i] = 0.0
+    N[:] = 0.0
     for i in range(N.shape[0]):
         p0 = depth_of(sea, r, i)
         if i < line.h.shape[0]:

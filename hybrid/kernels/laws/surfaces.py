@@ -39,7 +39,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, madd, mscale, outer, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, madd, mscale, outer, scale, sub, vector
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.state.report import (
     ALONG,
@@ -75,12 +75,6 @@ from hybrid.kernels.state.report import (
 
 
 @inner
-def three(rows, k, at):
-    """A vector in a row."""
-    return rows[k, at], rows[k, at + 1], rows[k, at + 2]
-
-
-@inner
 def away_from_box(boxes, j, y):
     """Square of the distance of a place to a box, m2; 0 within."""
     total = 0.0
@@ -93,7 +87,7 @@ def away_from_box(boxes, j, y):
 @called
 def nearest_on_facet(facets, f, y):
     """The nearest place on a facet, and which feature it is (Ericson, Real-Time Collision Detection, 5.1.5)."""
-    a, b, c = three(facets, f, CORNERS), three(facets, f, CORNERS + 3), three(facets, f, CORNERS + 6)
+    a, b, c = vector(facets[f], CORNERS), vector(facets[f], CORNERS + 3), vector(facets[f], CORNERS + 6)
     ab, ac, p = sub(b, a), sub(c, a), sub(y, a)
     d1, d2 = dot(ab, p), dot(ac, p)
     if d1 <= 0.0 and d2 <= 0.0:
@@ -115,7 +109,7 @@ def nearest_on_facet(facets, f, y):
     va = d3 * d6 - d5 * d4
     if va <= 0.0 and d4 >= d3 and d5 >= d6:
         return add(b, scale((d4 - d3) / ((d4 - d3) + (d5 - d6)), sub(c, b))), 1
-    n = three(facets, f, NORMAL)
+    n = vector(facets[f], NORMAL)
     return sub(y, scale(dot(n, sub(y, a)), n)), FACE
 
 
@@ -149,16 +143,16 @@ def mesh_surface(sea, root, radius, y):
     """d, n and curvature of a surface of triangles moved out by a radius, m; root: the first of its boxes."""
     facets = sea.facets
     best, c, feature = nearest_facet(sea.boxes, facets, root, y)
-    n = three(facets, best, NORMAL)
+    n = vector(facets[best], NORMAL)
     if feature == FACE:
-        return dot(n, sub(y, three(facets, best, CORNERS))) - radius, n, (0.0, (0.0, 0.0, 0.0), 0.0)
+        return dot(n, sub(y, vector(facets[best], CORNERS))) - radius, n, (0.0, (0.0, 0.0, 0.0), 0.0)
     w, at = sub(y, c), FEATURES + FEATURE * feature
-    m, rho = three(facets, best, at), math.sqrt(dot(w, w))
+    m, rho = vector(facets[best], at), math.sqrt(dot(w, w))
     if not rho > 1e-12 * radius:
         return -radius, m, (0.0, (0.0, 0.0, 0.0), 0.0)
     d = math.copysign(rho, dot(w, m))
     hollow = facets[best, at + TURNS] / d
-    along = three(facets, best, at + ALONG) if hollow != 0.0 else (0.0, 0.0, 0.0)
+    along = vector(facets[best], at + ALONG) if hollow != 0.0 else (0.0, 0.0, 0.0)
     return d - radius, scale(1.0 / d, w), (hollow, along, 0.0)
 
 

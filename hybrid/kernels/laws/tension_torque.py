@@ -68,7 +68,6 @@ from hybrid.kernels.laws.axial_law import (
     sliding_power,
     softness_of_damping,
     stiffness_at,
-    strain_and_energy,
     strain_and_energy_at,
 )
 from hybrid.kernels.laws.element import chord, relative_rotation, turns_freely
@@ -309,7 +308,7 @@ def stretch_energy(line, i, longer, low, high):
 @inner
 def stretch_factor(line, state, c, torque):
     """Length of cell c over its unstretched length under its tension and a torque (N m)."""
-    strain, _ = strain_and_energy(line, state, c)
+    strain, _ = strain_and_energy_at(line, state, c, state.T[c])
     if couples(line):
         strain += 2.0 * line.tension_twist[c] / line.h[c] * (line.tension_torque[c] * state.T[c] - torque)
     return 1.0 + strain

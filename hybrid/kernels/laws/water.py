@@ -89,8 +89,10 @@ from hybrid.kernels.algebra.rotations import (
     scale,
     stack,
     sub,
+    vector,
 )
 from hybrid.kernels.laws.element import Chord, chord
+from hybrid.kernels.laws.seabed import interval
 from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.state.report import DRAG_POWER, FLOW, REPORT_SIZE, SURFACE, WAVES
 from hybrid.kernels.state.state import LANES, ROWS, blank_state, in_sea, no_sea
@@ -129,30 +131,9 @@ LAST = math.log(FADED)
 TO_WHOLE = 1.5 * 2.0**52
 QUARTER_HIGH, QUARTER_LOW = 1.57079632673412561417, 6.07710050650619224932e-11
 # Coefficients of Taylor's series of sine, cosine and exponential.
-S3 = -1.0 / math.factorial(3)
-S5 = 1.0 / math.factorial(5)
-S7 = -1.0 / math.factorial(7)
-S9 = 1.0 / math.factorial(9)
-S11 = -1.0 / math.factorial(11)
-S13 = 1.0 / math.factorial(13)
-S15 = -1.0 / math.factorial(15)
-C2 = -1.0 / math.factorial(2)
-C4 = 1.0 / math.factorial(4)
-C6 = -1.0 / math.factorial(6)
-C8 = 1.0 / math.factorial(8)
-C10 = -1.0 / math.factorial(10)
-C12 = 1.0 / math.factorial(12)
-C14 = -1.0 / math.factorial(14)
-C16 = 1.0 / math.factorial(16)
-E2 = 1.0 / math.factorial(2)
-E3 = 1.0 / math.factorial(3)
-E4 = 1.0 / math.factorial(4)
-E5 = 1.0 / math.factorial(5)
-E6 = 1.0 / math.factorial(6)
-E7 = 1.0 / math.factorial(7)
-E8 = 1.0 / math.factorial(8)
-E9 = 1.0 / math.factorial(9)
-E10 = 1.0 / math.factorial(10)
+S3, S5, S7, S9, S11, S13, S15 = ((-1.0) ** (n // 2) / math.factorial(n) for n in range(3, 16, 2))
+C2, C4, C6, C8, C10, C12, C14, C16 = ((-1.0) ** (n // 2) / math.factorial(n) for n in range(2, 17, 2))
+E2, E3, E4, E5, E6, E7, E8, E9, E10 = (1.0 / math.factorial(n) for n in range(2, 11))
 # Wetness coordinates closer than this are one: their difference quotient would lose digits.
 SAME_WETNESS = 1e-4
 
@@ -166,13 +147,8 @@ def current_at(z, current, part, height):
     if height >= z[n - 1]:
         m = n - 1
         return (part * current[m, 0], part * current[m, 1], part * current[m, 2]), (0.0, 0.0, 0.0)
-    a, b = 0, n - 1
-    while b - a > 1:
-        m = (a + b) // 2
-        if z[m] <= height:
-            a = m
-        else:
-            b = m
+    a = interval(z, height)
+    b = a + 1
     q = part / (z[b] - z[a])
     U1 = (q * (current[b, 0] - current[a, 0]), q * (current[b, 1] - current[a, 1]), q * (current[b, 2] - current[a, 2]))
     t = height - z[a]
@@ -412,11 +388,6 @@ PUSH = 13  # 3, its acceleration, m/s2
 PIECE = 16
 
 
-@inner
-def three_from(row, o):
-    return (row[o], row[o + 1], row[o + 2])
-
-
 class PieceForce(NamedTuple):
     """Force f, N, on a piece, and the parts of its derivative by u: -p (1 - d d^T) - q un un^T - s d d^T."""
 
@@ -433,7 +404,7 @@ def piece_force(row, o, d, u):
     w, cn, ct = row[o + WET], row[o + CN], row[o + CT]
     ut = dot(d, u)
     un = sub(u, scale(ut, d))
-    size, a = math.sqrt(dot(un, un)), three_from(row, o + PUSH)
+    size, a = math.sqrt(dot(un, un)), vector(row, o + PUSH)
     push = scale(row[o + CM], sub(a, scale(dot(d, a), d)))
     f = sub(scale(w, push), add(scale(w * cn * size, un), scale(w * ct * abs(ut) * ut, d)))
     q = w * cn / size if size > 0.0 else 0.0
@@ -459,9 +430,9 @@ def members_force(row, first, count, R, v, spin):
     F, M, power = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
     for k in range(count):
         o = first + PIECE * k
-        arm, d = mat_vec(R, three_from(row, o + MIDDLE)), mat_vec(R, three_from(row, o + ALONG))
+        arm, d = mat_vec(R, vector(row, o + MIDDLE)), mat_vec(R, vector(row, o + ALONG))
         here = add(v, cross(spin, arm))
-        f = piece_force(row, o, d, sub(here, three_from(row, o + WATER))).f
+        f = piece_force(row, o, d, sub(here, vector(row, o + WATER))).f
         F, M, power = add(F, f), add(M, cross(arm, f)), power + dot(f, here)
     return F, M, power
 
@@ -472,14 +443,14 @@ def members_change(row, first, count, R, v, spin, dv, dspin, turn):
     dF, dM = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(count):
         o = first + PIECE * k
-        arm, d = mat_vec(R, three_from(row, o + MIDDLE)), mat_vec(R, three_from(row, o + ALONG))
+        arm, d = mat_vec(R, vector(row, o + MIDDLE)), mat_vec(R, vector(row, o + ALONG))
         darm = cross(turn, arm)
-        u = sub(add(v, cross(spin, arm)), three_from(row, o + WATER))
+        u = sub(add(v, cross(spin, arm)), vector(row, o + WATER))
         force = piece_force(row, o, d, u)
         du, c, a = (
             add(dv, add(cross(dspin, arm), cross(spin, darm))),
             row[o + WET] * row[o + CM],
-            three_from(row, o + PUSH),
+            vector(row, o + PUSH),
         )
         df = piece_change(force, c, d, u, a, du, turn)
         dF, dM = add(dF, df), add(dM, add(cross(darm, force.f), cross(arm, df)))

@@ -132,6 +132,7 @@ def _sum_of(header: dict[str, Any], code: bytes) -> str:
 # They keep machine code and call it, and make none.
 KEEPERS = ("argument_types.py", "cache.py", "code_file.py", "kept_code.py", "linked_code.py")
 KEPT = 4  # older folders, and codes of a kernel, are deleted; four let a few versions or branches live side by side
+PYTHON = f"{sys.version_info[0]}.{sys.version_info[1]}{getattr(sys, 'abiflags', '')}"
 SHIPPED = Path(__file__).parents[1] / "compiled"
 NEEDS = "needs.txt"  # in it: the numba and llvmlite whose code it is, as requirements
 
@@ -180,12 +181,8 @@ def compiler_hash(machine: Path = Path(__file__).parent) -> str:
         made.update(file.read_bytes())
     for name in ("numba", "llvmlite"):
         made.update(f"{name} {version(name)}".encode())
-    made.update(f"{_python()} {platform.machine()} {sysconfig.get_platform()}".encode())
+    made.update(f"{sys.implementation.name} {PYTHON} {platform.machine()} {sysconfig.get_platform()}".encode())
     return made.hexdigest()[:16]
-
-
-def _python() -> str:
-    return f"{sys.implementation.name} {sys.version_info[0]}.{sys.version_info[1]}{getattr(sys, 'abiflags', '')}"
 
 
 @cache
@@ -261,8 +258,7 @@ def features_of(level: Level) -> str:
 
 def folder_of(level: str) -> Path:
     """The folder in the package with the code for a level of this system, Python and numba."""
-    python = f"py{sys.version_info[0]}.{sys.version_info[1]}{getattr(sys, 'abiflags', '')}"
-    return SHIPPED / f"{sysconfig.get_platform()}-{level}-{python}-numba{version('numba')}"
+    return SHIPPED / f"{sysconfig.get_platform()}-{level}-py{PYTHON}-numba{version('numba')}"
 
 
 class Place(NamedTuple):

@@ -178,13 +178,8 @@ def fill_books(job):
     for c in range(m):
         for k in range(2):
             books.tension[k, c] = job.before.tension[k, c] if same else 0.0
-    for i in range(books.strains.shape[0]):
-        for j in range(books.strains.shape[1]):
-            books.strains[i, j] = 0.0
-    for row in range(books.extremes.shape[1]):
-        for k in range(books.extremes.shape[2]):
-            books.extremes[0, row, k], books.extremes[1, row, k] = math.inf, -math.inf
-            books.extremes[2, row, k], books.extremes[3, row, k] = math.nan, math.nan
+    books.strains[:] = 0.0
+    books.extremes[0], books.extremes[1], books.extremes[2:] = math.inf, -math.inf, math.nan
 
 
 @inner
@@ -215,13 +210,6 @@ def wave_step(line, scale):
 
 
 @inner
-def clear(x):
-    for i in range(x.shape[0]):
-        for j in range(x.shape[1]):
-            x[i, j] = 0.0
-
-
-@inner
 def begin_anew(job, state, s, line):
     """What a change of cells or of nodes leaves of the run beside the line: nothing is known of the step before.
 
@@ -233,15 +221,13 @@ def begin_anew(job, state, s, line):
         for i in range(job.new_push.shape[0]):  # of a state of either parity, as the state
             for k in range(job.new_push.shape[1]):
                 job.next_push[i, k] = job.new_push[i, k]
-    clear(job.sea.axis)
-    clear(job.sea.slip)
-    clear(job.sea.slid)
-    clear(job.sea.bed)
-    clear(job.sea.flow)
-    for j in range(job.work.report.shape[0]):
-        job.work.report[j] = 0.0
-    for k in range(job.work.X.shape[0]):
-        job.work.X[k] = 0.0  # factors are read as zeros where there is no unknown any more
+    job.sea.axis[:] = 0.0
+    job.sea.slip[:] = 0.0
+    job.sea.slid[:] = 0.0
+    job.sea.bed[:] = 0.0
+    job.sea.flow[:] = 0.0
+    job.work.report[:] = 0.0
+    job.work.X[:] = 0.0  # factors are read as zeros where there is no unknown any more
     job.nearest[0], job.nearest[1] = -1, -1
     job.books.clock.wave_step, job.books.counts.parity = wave_step(line, job.scale), 0
 
@@ -255,8 +241,8 @@ def clear_state(table):
         a, b, n = max(i - 1, 0), min(i, of.shape[0] - 1), of.shape[0]
         one, after = job.widths[of[a]], s[min(i + 1, n)] - s[i]
         width[i] = one + after / (s[i] - s[a] + after) * (job.widths[of[b]] - one)
-    clear(state.a1)
-    clear(state.bed)
+    state.a1[:] = 0.0
+    state.bed[:] = 0.0
     for c in range(state.T.shape[0]):
         state.w[c], state.wa[c], state.wd[c] = 0.0, 0.0, 0.0
 
@@ -308,7 +294,7 @@ def before_forces(table):
             for i in range(9):
                 ends.frame[k, i] = frames[k][i]
     sea_at(clock.now, job.sea)
-    clear(job.work.u)
+    job.work.u[:] = 0.0
     if job.line.bits & WAVES:
         wave_kinematics(job.sea, job.old.r, job.work.u)
     if job.line.bits & FRICTION:

@@ -365,8 +365,7 @@ def plan_cells(line, sea, state, zones, dt, finer):
     """
     at_once = find_wanted(line, sea, state, zones, dt, finer)
     begin, p = 0, 0
-    for k in range(zones.plan.shape[0]):
-        zones.plan[k] = False
+    zones.plan[:] = False
     for j in range(zones.parts.shape[0]):
         size = zones.parts[j]
         while zones.place[p] < begin:

@@ -153,9 +153,10 @@ def call_parts(job, first, last):
         call(job.parts[k, ADDRESS], job.change[job.parts[k, BEGIN] : job.parts[k, END]])
 
 
-@inner
-def begin_change(job):
+@kernel
+def begin_cells(table):
     """Lay out the cells that are planned, and carry the state to them."""
+    job = read(table)
     at = job.at
     k, n = at.side, at.cells
     m = call_count(job.calls.plan, job.planners[k])
@@ -164,9 +165,10 @@ def begin_change(job):
     call_parts(job, 0, at.begun)
 
 
-@inner
-def put_all(job):
+@kernel
+def put_cells(table):
     """The run goes on with the line of now."""
+    job = read(table)
     k, m = job.at.side, job.at.cells
     put_at(job.in_run[k], job.run_places, m, job.run)
     put_at(job.in_beside[k], job.beside_places, m, job.beside)
@@ -180,13 +182,14 @@ def put_all(job):
         put_at(job.in_odd[k], job.run_places, m, job.odd_joined)
 
 
-@inner
-def end_change(job):
+@kernel
+def end_cells(table):
     """Lengths, books and forces of the new cells, which the run goes on with; the energy is booked."""
+    job = read(table)
     at, calls = job.at, job.calls
     call_parts(job, at.begun, job.parts.shape[0])
     at.side, at.cells, at.changes = 1 - at.side, at.next_cells, at.changes + 1
-    put_all(job)
+    put_cells(table)
     job.own.now = job.clock.now
     call(calls.before_forces, job.run)
     job.run[at.task] = ASSEMBLY
@@ -217,24 +220,6 @@ def keep_rows(job):
 
 
 @kernel
-def put_cells(table):
-    """`put_all`."""
-    put_all(read(table))
-
-
-@kernel
-def begin_cells(table):
-    """`begin_change`."""
-    begin_change(read(table))
-
-
-@kernel
-def end_cells(table):
-    """`end_change`."""
-    end_change(read(table))
-
-
-@kernel
 def ask_cells(table):
     """Whether a change is due, and may be made without Python, as a number."""
     job = read(table)
@@ -250,8 +235,8 @@ def change_cells(table):
     """Other cells, after outputs within the last step."""
     job = read(table)
     keep_rows(job)
-    begin_change(job)
-    end_change(job)
+    begin_cells(table)
+    end_cells(table)
     return 1
 
 
@@ -316,13 +301,6 @@ def fill_node(line, i, made, a, ha, b, hb):
 
 
 @inner
-def fill_point(line, i, points, j, blank):
-    """The body at node i, of column j of `points`; -1: there is none."""
-    for k in range(POINTS.shape[0]):
-        array(line, POINTS[k, 0], 1)[i, 0] = points[k, j] if j >= 0 else blank[k]
-
-
-@inner
 def round_and_straight(line, i):
     """The element at node i of a swivel, whose sides have no direction in common: it bends as on average of its axes."""
     line.k0[i, 0], line.k0[i, 1] = 0.0, 0.0
@@ -348,13 +326,6 @@ def fill_element(line, i, made, a, ha, b, hb, turns):
         line.kb[i, 2] = 0.0
         if ha > 0.0 and hb > 0.0:
             round_and_straight(line, i)
-
-
-@inner
-def no_element(line, i):
-    """A line without an element at node i."""
-    for k in range(3):
-        line.kb[i, k], line.k0[i, k] = 0.0, 0.0
 
 
 @inner
@@ -479,9 +450,11 @@ def fill_line(table):
         hb = line.h[b] if i > 0 else 0.0
         he = line.h[e] if i < n else 0.0
         line.s[i] = s[i]
-        fill_point(line, i, cable.points, j, cable.blank)
+        for k in range(POINTS.shape[0]):
+            array(line, POINTS[k, 0], 1)[i, 0] = cable.points[k, j] if j >= 0 else cable.blank[k]
         fill_node(line, i, made, of[b], hb, of[e], he)
-        no_element(line, i)
+        for k in range(3):
+            line.kb[i, k], line.k0[i, k] = 0.0, 0.0
         inside = 0 < i < n
         end = 1 if i == n else 0
         line.element[i] = line.spin[b] and line.spin[e] and (inside or cable.held[end, 0])

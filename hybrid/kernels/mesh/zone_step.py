@@ -484,9 +484,7 @@ def advance_zones(table):
         evaluate(line, job.sea, ends, job.old if count.parity else job.new, zones, job.near, dt)
         return 1 if zones.clock.highest_ratio > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
-    state, before = job.old, job.new
-    if count.parity:
-        state, before = before, state
+    state, before = (job.new, job.old) if count.parity else (job.old, job.new)
     for k in range(QUANTITIES):
         zones.largest[k] *= math.exp(-clock.last_dt / zones.clock.memory)
     job.work[0, b.ZONES] += book(line, ends, before, state, clock.last_dt, zones)

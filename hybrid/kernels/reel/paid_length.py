@@ -35,7 +35,7 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, dot, frame, get3, get9, scale, sub
+from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import has_law
 from hybrid.kernels.laws.bending_law import (
     EACH,
@@ -96,8 +96,7 @@ def length_at(law, t):
 @inner
 def made_between(pieces, begin, end, out, row):
     """The row of the material between two arc lengths: the mean of its pieces; of stiffness that of their compliances."""
-    for j in range(COLUMNS):
-        out[row, j] = 0.0
+    out[row, :COLUMNS] = 0.0
     for k in range(pieces.shape[0]):
         a = max(pieces[k, 0], begin) if k > 0 else begin
         z = min(pieces[k + 1, 0], end) if k + 1 < pieces.shape[0] else end
@@ -353,10 +352,7 @@ def moment_of(line, ends, state, j):
     k = 0 if j == 0 else 1
     if not line.element[j]:
         return scale(2.0 * k - 1.0, get3(ends.moment, k))
-    c = 0 if j == 0 else n - 1
-    d, _, _ = chord(get3(state.e, c))
-    held, beside = get9(ends.frame, k), frame(get3(state.a1, c), d)
-    before, after = (held, beside) if j == 0 else (beside, held)
+    before, after = frames_at(line, ends, state, j)
     M, _ = bending_at(line, j, before, after, get3(line.kb, j), get3(line.k0, j))
     return M
 
@@ -517,8 +513,7 @@ def let_layers_flow(line, before, reel):
 def stop_flow(line, reel):
     """Between steps nothing flows."""
     for k in range(growing(line, reel), line.h.shape[0] + 1):
-        for j in range(line.slip_flow.shape[1]):
-            line.slip_flow[node(line, reel, k), j] = 0.0
+        line.slip_flow[node(line, reel, k)] = 0.0
 
 
 @kernel

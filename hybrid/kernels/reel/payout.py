@@ -245,13 +245,6 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
 
 
 @inner
-def book_layers(job, before, state):
-    """Energy of layers that came in with material through an accepted step; nothing flows any more."""
-    job.work[0, end_of(job.reel)] += layers_that_came(job.line, job.ends, before, state, job.reel)
-    stop_flow(job.line, job.reel)
-
-
-@inner
 def remember_all(job, state):
     """What the books of the next step ask of a state."""
     remember(job.line, job.ends, state, job.reel)
@@ -315,9 +308,7 @@ def pay_out(table):
         return 0
     # a step is accepted, and the states have changed places
     reel.stage.flow_known = 0.0
-    state, before = job.old, job.new
-    if count.parity:
-        state, before = before, state
+    state, before = (job.new, job.old) if count.parity else (job.old, job.new)
     if winch.tension > 0.0:
         accept(winch, numbers.length, numbers.rate, numbers.acceleration)
     job.work[0, end_of(reel)] += book(line, job.ends, before, state, reel, clock.last_dt)
@@ -325,7 +316,8 @@ def pay_out(table):
     if line.bits & TOUCHES:
         book_contact(line, job.sea, before, state, reel, job.work)
     if flows(line):
-        book_layers(job, before, state)
+        job.work[0, end_of(reel)] += layers_that_came(line, job.ends, before, state, reel)
+        stop_flow(line, reel)
     remember_all(job, state)
     if count.controlled:
         limit_step(reel, clock)
@@ -470,9 +462,10 @@ def remove_forces(table):
     remove_balance(job.line, job.reel)
 
 
-@inner
-def stand(job):
+@kernel
+def stand_still(table):
     """The line at clock[NOW], and the force of its fairlead, for a state that no step has led to."""
+    job = read(table)
     was_on, damped, t = job.reel.stage.flow_known > 0.0, job.reel.flow.shape[0] > 0, job.clock.now
     state = job.new if job.counts.parity else job.old
     find_length(job.reel, t)
@@ -495,13 +488,7 @@ def stand(job):
 
 
 @kernel
-def stand_still(table):
-    """`stand`."""
-    stand(read(table))
-
-
-@kernel
 def stand_among(table):
     """`stand_still`, for a line of several."""
-    stand(read(table))
+    stand_still(table)
     return 0

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
-from hybrid.kernels.laws.axial_law import has_law, strain_and_energy
+from hybrid.kernels.laws.axial_law import has_law, strain_and_energy_at
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.laws.seabed import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
@@ -24,8 +24,9 @@ from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.mesh.cell_changes import begin_anew, clear
+from hybrid.kernels.mesh.cell_changes import begin_anew
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, copy_cell, copy_node, move_line
+from hybrid.kernels.mesh.zone_transfer import put3
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, piece_at, place_of, prepare
 from hybrid.kernels.reel.payout import chord_at, left_behind, way_at
 from hybrid.kernels.reel.payout_work import put_travels, strain_at
@@ -34,6 +35,7 @@ from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.state import NO_SOIL, Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blank_state, blanks
 from hybrid.kernels.step.step_control import lead
+from hybrid.kernels.watch.extremes import fold_node
 
 
 class CarryJob(NamedTuple):
@@ -69,7 +71,7 @@ class Flow(NamedTuple):
 # --- places ---------------------------------------------------------------------------------------
 
 
-@inner
+@kernel
 def place_reel(reel, nodes, count):
     """What a reel knows of a line of so many material nodes; none of its cells lacks anything."""
     numbers, before, place, next_ = reel.numbers, nodes[count - 2], nodes[count - 1], nodes[count]
@@ -85,12 +87,6 @@ def place_reel(reel, nodes, count):
     rides = reel.layer.shape[0] - 1
     for k in range(rides):
         reel.true[count + k] = reel.layer[k] - reel.layer[k + 1]
-
-
-@kernel
-def put_places(reel, nodes, count):
-    """`place_reel`."""
-    place_reel(reel, nodes, count)
 
 
 # --- the state ------------------------------------------------------------------------------------
@@ -143,13 +139,8 @@ def move_state(state, out, forward, cut, step):
 
 
 @inner
-def put(x, i, value):
-    x[i, 0], x[i, 1], x[i, 2] = value
-
-
-@inner
 def put_chord(line, state, reel, c, e):
-    put(state.e, cell(line, reel, c), scale(reel.numbers.side, e))
+    put3(state.e, cell(line, reel, c), scale(reel.numbers.side, e))
 
 
 @inner
@@ -191,7 +182,7 @@ def strain_of(line, state, c):
     """Strain of cell c (of the line) under its tension without damping, and a torque where tension makes one."""
     if couples(line):
         return stretch_factor(line, state, c, torque_beside(line, state, c)) - 1.0
-    strain, _ = strain_and_energy(line, state, c)
+    strain, _ = strain_and_energy_at(line, state, c, state.T[c])
     return strain
 
 
@@ -263,7 +254,7 @@ def put_director(job, c, a, e, turn):
     a, side = carried(a, e, to), job.new.numbers.side / math.sqrt(dot(to, to))
     if turn != 0.0:
         a = add(scale(math.cos(turn), a), scale(math.sin(turn) * side, cross(to, a)))
-    put(job.out.a1, cell(job.target, job.new, c), a)
+    put3(job.out.a1, cell(job.target, job.new, c), a)
 
 
 @inner
@@ -333,10 +324,10 @@ def enter(job, flow, g):
     put_chord(target, out, new, g, chord)
     put_chord(target, out, new, i, sub(e_old, chord))
     at, before, behind = node(target, new, i), node(line, reel, g), node(line, reel, i)
-    put(out.r, at, add(get3(state.r, before), chord))
-    put(out.v, at, rate)
-    put(out.a, at, algorithmic)
-    put(out.vd, at, true)
+    put3(out.r, at, add(get3(state.r, before), chord))
+    put3(out.v, at, rate)
+    put3(out.a, at, algorithmic)
+    put3(out.vd, at, true)
     h = place_of(line, reel, i) - place_of(line, reel, g)
     part = (place - place_of(line, reel, g)) / h
     put_travels(state, out, at, before, behind, part)
@@ -402,9 +393,10 @@ def leave(job, flow, g):
     let_lack(job, flow, c, true, flow.rate, rises, kept, late, span_of(job, flow, g))
 
 
-@inner
-def carry(job):
+@kernel
+def carry_node(table):
     """The state on the new nodes, and what new cells lack."""
+    job = read(table)
     line, reel, new = job.line, job.reel, job.new
     n, m = line.h.shape[0], job.target.h.shape[0]
     g, flow, step = n - reel.layer.shape[0], flow_at(reel, job.clock), m - n
@@ -418,12 +410,6 @@ def carry(job):
     )  # no force that payout_balance does not know
     new.stage.unbalanced = 1.0 if plain else 0.0
     new.numbers.changed, new.numbers.easing = job.clock.now if plain else -np.inf, span_of(job, flow, g)
-
-
-@kernel
-def carry_node(table):
-    """`carry`."""
-    carry(read(table))
 
 
 # --- one node more or less: what a change of cells calls ---------------------------------------
@@ -491,22 +477,11 @@ def fold(job, n, forward):
     books, columns = job.before, job.bounds.shape[2]
     at = 0 if forward else columns - job.before.extremes.shape[2]
     for i in range(n + 1):
-        join_column(books.extremes, job.bounds, i, at)
+        fold_node(books.extremes, i, at, job.bounds)
         at += 1
         if books.right[i] != i:
-            join_column(books.extremes, job.bounds, books.right[i], at)
+            fold_node(books.extremes, books.right[i], at, job.bounds)
             at += 1
-
-
-@kernel
-def join_column(extremes, bounds, column, at):
-    """Extremes of one column into those at a place."""
-    for row in range(bounds.shape[1]):
-        x, y = extremes[0, row, column], extremes[1, row, column]
-        if np.isfinite(x) and x < bounds[0, row, at]:
-            bounds[0, row, at], bounds[2, row, at] = x, extremes[2, row, column]
-        if np.isfinite(y) and y > bounds[1, row, at]:
-            bounds[1, row, at], bounds[3, row, at] = y, extremes[3, row, column]
 
 
 @inner
@@ -532,8 +507,8 @@ def renew_books(job, n, m, forward, cut):
     if not forward:
         for k in range(books.base.shape[0]):
             books.base[k] += m - n
-    clear(books.tension)
-    clear(books.strains)
+    books.tension[:] = 0.0
+    books.strains[:] = 0.0
     for row in range(books.extremes.shape[1]):
         for k in range(books.extremes.shape[2]):
             books.extremes[0, row, k], books.extremes[1, row, k] = np.inf, -np.inf

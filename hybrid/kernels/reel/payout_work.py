@@ -34,22 +34,23 @@ from hybrid.kernels.algebra.rotations import (
     add,
     cross,
     dot,
-    frame,
     get3,
-    get9,
     inverse_left_jacobian,
     jacobian_functions,
     log_rotation,
     mat_vec,
+    matrix,
+    put,
     scale,
     sub,
     vec_mat,
+    vector,
 )
 from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
 from hybrid.kernels.laws.element import chord, frames_at, relative_rotation, turning
 from hybrid.kernels.laws.obstacle_grip import mean_force
-from hybrid.kernels.laws.obstacles import normal_at, put_vector, row3, row9, stored_along, transposed
+from hybrid.kernels.laws.obstacles import normal_at, stored_along, transposed
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import couples, rest_strain
 from hybrid.kernels.machine.compile import inner
@@ -103,12 +104,6 @@ def elastic_tension(line, state, i):
 
 
 @inner
-def compliance_at(line, reel, j):
-    """Compliance, 1/N, of the material at node j."""
-    return reel.pieces[piece_at(reel, line.s[node(line, reel, j)]), 1 + COMPLIANCE]
-
-
-@inner
 def strain_of_face(line, state, reel, j):
     """Strain of the material at node j, from the fairlead's neighbours on."""
     n = line.h.shape[0]
@@ -123,7 +118,8 @@ def strain_of_face(line, state, reel, j):
             T, U = state.T[a], state.T[b]
         else:
             T, U = elastic_tension(line, state, a), elastic_tension(line, state, b)
-    return compliance_at(line, reel, j) * (T + part * (U - T))
+    c = reel.pieces[piece_at(reel, line.s[node(line, reel, j)]), 1 + COMPLIANCE]
+    return c * (T + part * (U - T))
 
 
 @inner
@@ -356,8 +352,8 @@ def let_material_rub(line, sea, before, reel):
         for j in range(3):
             sea.slip[i, j] = before.slip[i, j] - more * along[j]
         for m in range(line.moved.shape[0]):  # with the obstacle, whose travels turn with it in the step
-            at, way = EACH * m + TRAVEL, mat_vec(transposed(row9(sea.carried, m, SWEEP)), along)
-            put_vector(sea.grip, i, at, sub(row3(before.grip, i, at), scale(more, way)))
+            at, way = EACH * m + TRAVEL, mat_vec(transposed(matrix(sea.carried[m], SWEEP)), along)
+            put(sea.grip[i], at, sub(vector(before.grip[i], at), scale(more, way)))
 
 
 @inner
@@ -366,20 +362,20 @@ def travel_between(force, of_force, travel, of_travel, i, k, part):
 
     force, travel: tables with a row for each node, in which they stand from a column on.
     """
-    a, z = row3(force, i, of_force), row3(force, k, of_force)
+    a, z = vector(force[i], of_force), vector(force[k], of_force)
     one, other = dot(a, a) > 0.0, dot(z, z) > 0.0
     if one != other:
-        return row3(travel, i if one else k, of_travel)
-    return add(scale(1.0 - part, row3(travel, i, of_travel)), scale(part, row3(travel, k, of_travel)))
+        return vector(travel[i if one else k], of_travel)
+    return add(scale(1.0 - part, vector(travel[i], of_travel)), scale(part, vector(travel[k], of_travel)))
 
 
 @inner
 def put_travels(state, out, new, i, k, part):
     """Travels of friction of a node that has just entered, number `new` of `out`, between nodes i and k of `state`."""
-    put_vector(out.slip, new, 0, travel_between(state.bed, 0, state.slip, 0, i, k, part))
+    put(out.slip[new], 0, travel_between(state.bed, 0, state.slip, 0, i, k, part))
     for at in range(0, state.grip.shape[1], EACH):
         found = travel_between(state.grip, at + FORCE, state.grip, at + TRAVEL, i, k, part)
-        put_vector(out.grip, new, at + TRAVEL, found)
+        put(out.grip[new], at + TRAVEL, found)
 
 
 @inner
@@ -423,15 +419,8 @@ def end_of(reel):
 @inner
 def turn_at(line, ends, state, i):
     """Turn, rad, of the element at node i: between its cells, at an end between its cell and what holds that."""
-    n = line.h.shape[0]
-    if i == 0 or i == n:
-        c, held = min(i, n - 1), get9(ends.frame, 0 if i == 0 else 1)
-        d, _, _ = chord(get3(state.e, c))
-        beside = frame(get3(state.a1, c), d)
-        return log_rotation(relative_rotation(held, beside) if i == 0 else relative_rotation(beside, held))
-    da, _, _ = chord(get3(state.e, i - 1))
-    db, _, _ = chord(get3(state.e, i))
-    return log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
+    Ra, Rb = frames_at(line, ends, state, i)
+    return log_rotation(relative_rotation(Ra, Rb))
 
 
 @inner

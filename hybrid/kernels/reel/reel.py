@@ -172,9 +172,7 @@ def answer_of_cell(line, state, winch, X, W, columns, c, at):
     """
     forward, column, x = columns[0], columns[1], columns[2]
     n = line.h.shape[0]
-    for i in range(n + 1):
-        for k in range(5):
-            x[i, k] = 0.0
+    x[:] = 0.0
     x[c + 1, 0] = by_length(line, state, winch, c)
     if line.bits & PLANAR:
         solve_forward_planar(line.plane, X, x, forward)

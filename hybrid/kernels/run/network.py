@@ -39,8 +39,7 @@ from hybrid.kernels.junctions.borders import (
 from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
-from hybrid.kernels.laws.obstacles import put_matrix as put_matrix_of
-from hybrid.kernels.laws.obstacles import put_vector, stored_in_contact
+from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller
 from hybrid.kernels.march.energies import book_work, find_powers
@@ -203,13 +202,6 @@ def end_lines(tables, floors, s, task, good):
 
 
 @inner
-def keep_report(books, report):
-    """The report of the state as it is, from which steps go on."""
-    for k in range(report.shape[0]):
-        books.report[0, k] = report[k]
-
-
-@inner
 def note_quantities(table, job, t):
     """Ranges of the quantities that are asked of a line, to its state at t (s)."""
     if job.quantities != 0:
@@ -222,7 +214,8 @@ def begin_books_of(table, job, t):
     """Powers and extremes of a line as it is, of which the report is known; t: s, now."""
     line, new, books, report = job.line, job.new, job.books, job.work.report
     find_powers(line, job.ends, books.velocity, new, report, books.power[0])
-    keep_report(books, report)
+    for k in range(report.shape[0]):
+        books.report[0, k] = report[k]
     impose_now(job.ends, books.imposed)
     if books.counts.repeats > 0:  # a state that is known, from which a step is tried once more
         return
@@ -411,8 +404,8 @@ def carry_sampled(network, sea, rows):
     for k in range(network.rides.shape[0]):
         b = network.rides[k]
         if b >= 0:
-            put_vector(sea.carried, k, ENDED, vector(rows[b], SAMPLE_PLACE))
-            put_matrix_of(sea.carried, k, TURNED_AXES, matrix(rows[b], SAMPLE_AXES))
+            put(sea.carried[k], ENDED, vector(rows[b], SAMPLE_PLACE))
+            put_matrix(sea.carried[k], TURNED_AXES, matrix(rows[b], SAMPLE_AXES))
 
 
 @inner

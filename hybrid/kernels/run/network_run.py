@@ -220,9 +220,7 @@ def try_lone(steps, network):
 def try_step(steps, network):
     """Solve the step that is tried, and note how that ended."""
     clock, counts, asked = steps.clock, steps.counts, network.asked
-    table, own = steps.joined_even, steps.even
-    if counts.parity:
-        table, own = steps.joined_odd, steps.odd
+    table, own = (steps.joined_odd, steps.odd) if counts.parity else (steps.joined_even, steps.even)
     asked.what, asked.dt, asked.time = STEP, clock.try_end - clock.now, clock.try_end
     asked.before, asked.rho_of_step, asked.rho_of_last = clock.last_dt, clock.rho, clock.last_rho
     asked.cv, asked.ca, asked.scale, asked.fixed = 0.0, 0.0, 1.0, 1.0 - counts.controlled
@@ -260,10 +258,7 @@ def touches_free(steps, network):
     """Whether a line that was solved by itself has come to touch what is free, at the end of the try."""
     if steps.finder == 0 or steps.counts.outcome != OK:
         return False
-    next_table = steps.odd
-    if steps.counts.parity:
-        next_table = steps.even
-    call_book(steps.finder, next_table)
+    call_book(steps.finder, steps.even if steps.counts.parity else steps.odd)
     return is_touched_alone(network)
 
 
@@ -402,10 +397,7 @@ def accept(steps, network):
         steps.seen[l] = watch_itself(job, job.new)
         flags |= job.books.counts.notices | steps.seen[l]
     if steps.watcher != 0:  # the parity is that of the next step
-        watched = steps.watched_odd
-        if counts.parity:
-            watched = steps.watched_even
-        if call_watch(steps.watcher, watched) > 0:
+        if call_watch(steps.watcher, steps.watched_even if counts.parity else steps.watched_odd) > 0:
             flags |= LINES_NEAR
     if steps.tangents != 0:
         call_watch(steps.tangents, steps.beside)
@@ -427,10 +419,7 @@ def renew_ended(steps):
         for l in range(network.tables.shape[0]):
             if network.joints[l, 0] < 0 and network.joints[l, 1] < 0:
                 job = read(network.tables[l])
-                state = job.old
-                if counts.parity:
-                    state = job.new
-                renew_accelerations(job.line, state, clock.until - clock.begin)
+                renew_accelerations(job.line, job.new if counts.parity else job.old, clock.until - clock.begin)
 
 
 @inner
@@ -470,10 +459,7 @@ def between_steps(steps, table):
     if counts.phase == TRY:
         if counts.rows == steps.log.shape[0]:  # one step may be cut into many
             return PAUSED
-        own = steps.even
-        if counts.parity:
-            own = steps.odd
-        clock.try_end = end_of_tries(steps, read_network(own))
+        clock.try_end = end_of_tries(steps, read_network(steps.odd if counts.parity else steps.even))
         counts.phase = SOLVE
         if counts.asks & ASK_BEFORE:
             return TRYING
@@ -487,9 +473,7 @@ def sample_network(table):
     Returns 0 where the buffers are full before the last of them, else 1.
     """
     steps = read_steps(table)
-    own = steps.even
-    if steps.counts.parity:
-        own = steps.odd
+    own = steps.odd if steps.counts.parity else steps.even
     if steps.counts.phase == SAMPLE:
         return sample_within(steps, read_network(own))
     return sample_now(steps, read_network(own))
@@ -504,9 +488,7 @@ def run_network(table):
         code = between_steps(steps, table)
         if code >= 0:
             return code
-        own = steps.even
-        if counts.parity:
-            own = steps.odd
+        own = steps.odd if counts.parity else steps.even
         network = read_network(own)
         if counts.phase == SOLVE:
             advance_lines(steps)

@@ -277,9 +277,7 @@ def leave_over_at_rest(job, other, cv, ca):
     """What `leave_over` does, of a state as it is, at which no step ends."""
     work, b, there = other.work, other.left, other.even
     put_other(None, 1, other.line, job.even, other.rates, other.spin, other.h, there)
-    for i in range(b.shape[0]):
-        for k in range(3):
-            work.u[i, k] = 0.0
+    work.u[:] = 0.0
     if other.line.bits & WAVES:
         wave_kinematics(other.sea, there.r, work.u)
     left_over_in_space(other.line, other.sea, other.ends, there.r, there, cv, ca, work, b)
@@ -366,17 +364,13 @@ def hold_ends(network):
 @inner
 def old_of(job, x):
     """Of the states of a line the one before the last step; x: the line of the run, or another one."""
-    if job.counts.parity == 0:
-        return x.odd
-    return x.even
+    return x.even if job.counts.parity else x.odd
 
 
 @inner
 def new_of(job, x):
     """And the one behind it."""
-    if job.counts.parity == 0:
-        return x.even
-    return x.odd
+    return x.odd if job.counts.parity else x.even
 
 
 @inner
@@ -462,10 +456,7 @@ def advance(plane, space, network, net, p, s):
 @inner
 def advance_tangents(plane, space, net):
     """Tangents of all lines and bodies through the last step of their run."""
-    own = net.even
-    if net.counts.parity == 0:
-        own = net.odd
-    network = read_network(own)
+    network = read_network(net.even if net.counts.parity else net.odd)
     task = task_of(network.asked)
     task = with_radius(task, task.rho)
     s = scheme(task.rho, task.before, task.rho_before, task.dt)

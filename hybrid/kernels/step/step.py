@@ -254,12 +254,6 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
 
 
 @inner
-def spin_of_step(old, new, s, c):
-    """Spin of cell c about its chord in a step, rad, however many turns; rates are known."""
-    return s.dt * (old.w[c] + s.dt * ((0.5 - s.be) * old.wa[c] + s.be * new.wa[c]))
-
-
-@inner
 def largest_spin(line, ends, old, new, s):
     """Largest spin of a cell against the next one, or against what holds its twist, in a step, rad, and the cell.
 
@@ -269,7 +263,7 @@ def largest_spin(line, ends, old, new, s):
     for i in range(n + 1):
         now = 0.0
         if i < n and line.spin[i]:
-            now = spin_of_step(old, new, s, i)
+            now = s.dt * (old.w[i] + s.dt * ((0.5 - s.be) * old.wa[i] + s.be * new.wa[i]))  # however many turns
         inert = line.polar[max(i - 1, 0)] > 0.0 or line.polar[min(i, n - 1)] > 0.0
         if inert and line.element[i] and line.kb[i, 2] > 0.0:
             if i == 0 or i == n:

@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub, vector
 from hybrid.kernels.laws.seabed import bed_under
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.books import VON_MISES, WALL_TENSION
@@ -194,16 +194,11 @@ PATH_ROW = 10
 
 
 @inner
-def row3(row, k):
-    return (row[k], row[k + 1], row[k + 2])
-
-
-@inner
 def pull_at(seen, k):
     """f at end k, and whether anything takes it."""
     if not (seen.held[k] or seen.loaded[k]):
         return (0.0, 0.0, 0.0), False
-    return row3(seen.report, FORCE_A + 3 * k), True
+    return vector(seen.report, FORCE_A + 3 * k), True
 
 
 @inner
@@ -280,7 +275,7 @@ def radius_at(radii, s):
 @inner
 def over_plane(seen, asked, first, last):
     """Least height over a plane of the cells from node `first` to `last`, and its arc length."""
-    s, r, n, b = seen.s, seen.r, row3(asked, DIRECTION), row3(asked, POINT)
+    s, r, n, b = seen.s, seen.r, vector(asked, DIRECTION), vector(asked, POINT)
     least, where = math.inf, math.nan
     here = dot(n, sub(get3(r, first), b))
     for c in range(first, last):
@@ -400,7 +395,7 @@ def of_pull(seen, asked, reached, k):
         return math.hypot(f[0], f[1])
     if kind == VERTICAL_FORCE:
         return f[2]
-    along = row3(asked, DIRECTION)
+    along = vector(asked, DIRECTION)
     if kind == FORCE_ALONG:
         return dot(along, f)
     if UPLIFT <= kind <= UPLIFT_ANGLE:

@@ -243,16 +243,8 @@ def put_band(x, clamp, p, a, b, c):
 def correct(x, k, bed, work, part):
     """Go a part of a step of Newton's method; the largest change of w, m, of all of it."""
     n = x.T.shape[0]
-    q, a, b, c, h, G, L, z = (
-        work[LOAD],
-        work[MAIN],
-        work[BELOW],
-        work[SECOND],
-        work[PER_LENGTH],
-        work[PER_PIVOT],
-        work[FIRST],
-        work[RIGHT],
-    )  # G: 1/D
+    q, a, b, c = work[LOAD], work[MAIN], work[BELOW], work[SECOND]
+    h, G, L, z = work[PER_LENGTH], work[PER_PIVOT], work[FIRST], work[RIGHT]  # G: 1/D
     bent = x.EI[1] * k[1]
     before = (x.T[0] * (x.w[1] - x.w[0]) - (bent - x.EI[0] * k[0])) * h[0]
     e = second = z[0] = L[0] = 0.0
@@ -492,13 +484,6 @@ def observe_layers(tables, points, less):
                 i, one = j, two
 
 
-@inner
-def part_that_lies(a, b):
-    """Part of a cell that is in contact; a, b: depths of its nodes, m."""
-    high, low = max(a, b), min(a, b)
-    return 0.0 if high <= 0.0 else 1.0 if low > 0.0 else high / (high - low)
-
-
 @kernel
 def observe_bed(tables, sea):
     """Find `bed` and `touch` of all outputs."""
@@ -511,7 +496,9 @@ def observe_bed(tables, sea):
             after = 0.0
             if i < n:
                 bed[i + 1, DEPTH], bed[i + 1, SINKING], after = node_pressure(sea, x, i + 1)
-                x.touch[GROUNDED] += (s[i + 1] - s[i]) * part_that_lies(bed[i, DEPTH], bed[i + 1, DEPTH])
+                high, low = max(bed[i, DEPTH], bed[i + 1, DEPTH]), min(bed[i, DEPTH], bed[i + 1, DEPTH])
+                lies = 0.0 if high <= 0.0 else 1.0 if low > 0.0 else high / (high - low)
+                x.touch[GROUNDED] += (s[i + 1] - s[i]) * lies
             bed[i, BORNE] = borne(x.line.h, i, before, here, after)
             before, here = here, after
         for end in range(2):

@@ -44,7 +44,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub, vector
 from hybrid.kernels.laws.bending_law import (
     RIGID,
     curvature_under,
@@ -171,15 +171,9 @@ def all_stiffness(line, i, pieces, way):
 
 
 @inner
-def goes_on_outside(line, marks, i):
-    """Whether inner node i is of a catenary, without what may make a kink there."""
-    return not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i]
-
-
-@inner
 def balance(line, ends, rods, i, a, b):
     """Diagonal and right side of the balance of node i of the rod from node a to b, if a is not an end that turns."""
-    n, h, pieces, inside = line.h.shape[0], line.h, rods.hinges, a < i < b
+    h, pieces, inside = line.h, rods.hinges, a < i < b
     way = 1 if i == a else -1
     K, rod = all_stiffness(line, i, pieces, way), min(max(i, a), b - 1)
     T = 0.5 * (rods.T[i - 1] + rods.T[i]) if inside else rods.T[rod]
@@ -188,7 +182,7 @@ def balance(line, ends, rods, i, a, b):
     rhs = scale(T * lack * line.hn[i], bend_at(line, ends, rods, i))
     diagonal = T / K + (1.0 / h[i - 1] if i > a else 0.0) + (1.0 / h[i] if i < b else 0.0)
     outer = i - way
-    if not inside and 0 < outer < n and goes_on_outside(line, rods.marks, outer):
+    if not inside and is_smooth(line, rods.marks, outer):
         cell = 1.0 / h[min(i, outer)]
         diagonal += cell
         rhs = add(
@@ -201,11 +195,6 @@ def balance(line, ends, rods, i, a, b):
 def turns_freely(line, i):
     """Whether node i is an end of the line that has no moment, or one that is given."""
     return (i == 0 or i == line.h.shape[0]) and not line.element[i]
-
-
-@inner
-def get_solved(bent, i):
-    return (bent[i, D], bent[i, D + 1], bent[i, D + 2])
 
 
 @kernel
@@ -223,14 +212,14 @@ def restore_rod(line, ends, rods, a, b):
         diagonal, rhs = balance(line, ends, rods, i, a, b)
         if i > a:
             diagonal -= bent[i - 1, C] / h[i - 1]
-            rhs = add(rhs, scale(1.0 / h[i - 1], get_solved(bent, i - 1)))
+            rhs = add(rhs, scale(1.0 / h[i - 1], vector(bent[i - 1], D)))
         bent[i, C] = 1.0 / (h[i] * diagonal) if i < b else 0.0
         for k in range(3):
             bent[i, D + k] = rhs[k] / diagonal
     M = (0.0, 0.0, 0.0)
     for j in range(b - a + 1):
         i = b - j
-        M = add(get_solved(bent, i), scale(bent[i, C], M))
+        M = add(vector(bent[i], D), scale(bent[i, C], M))
         bend, part = bend_at(line, ends, rods, i), 0.0
         if line.element[i]:
             part = part_of_stiffness(line, i, pieces)
@@ -513,12 +502,6 @@ def layer_part(line, state, j, way, EI):
 
 
 @inner
-def stiffness_at(line, j):
-    """EI, N m2, of the element at node j."""
-    return line.kb[j, 0] * line.hn[j]
-
-
-@inner
 def is_hinge(line, books, k):
     """Whether the curvature of a rod would fade to nothing at end k, where a catenary of two cells or more ends."""
     n = line.h.shape[0]
@@ -578,7 +561,7 @@ def put_layer_back(line, ends, state, books, i, way):
     bent[i, RAW], bent[i, BENT] = towards(line, state, books.marks, i, -way), own
     if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
         return
-    T, EI = state.T[min(j, i)], stiffness_at(line, j)
+    T, EI = state.T[min(j, i)], line.kb[j, 0] * line.hn[j]
     direction, part = bend_direction(line, state.e, outer), layer_part(line, state, j, way, EI)
     before = stiffness_share(EI, T, line.hn[i], line.h[min(outer, i)])
     after = stiffness_share(EI, T, line.hn[i], line.h[min(j, i)])
@@ -594,7 +577,7 @@ def put_layer_back(line, ends, state, books, i, way):
         j += way
         if not (0 < j < n and goes_on(line, books.marks, j, way)):
             break
-        part *= layer_part(line, state, j, way, stiffness_at(line, j))
+        part *= layer_part(line, state, j, way, line.kb[j, 0] * line.hn[j])
 
 
 @called
