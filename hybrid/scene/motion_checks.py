@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -34,9 +34,6 @@ from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Row, Vessel
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.sea_checks import deepest_place
 
-if TYPE_CHECKING:
-    from hybrid.scene.schema import LineScene
-
 # A harmonic motion counts as starting from rest below this part of its top speed: round-off.
 AT_REST = 1e-6
 # Time steps that a period, and a ramp, must last at least: six steps a period are a poor answer, but the same motion.
@@ -54,6 +51,16 @@ STEEL_WAVES = 5000.0
 # Largest speed and acceleration of a smooth move, over way / time and way / time^2: 15/8, and that of the polynomial
 # 10 x^3 - 15 x^4 + 6 x^5 at x = (3 - sqrt(3)) / 6.
 TOP_SPEED, TOP_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
+
+
+class Moving(Protocol):
+    """What moves and loads a line: of its scene, the tables that are asked here."""
+
+    @property
+    def ends(self) -> Ends: ...
+
+    @property
+    def environment(self) -> Environment: ...
 
 
 def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
@@ -281,12 +288,12 @@ def _winch_ramps(ends: Ends) -> Iterator[tuple[float, float]]:
             yield payout.winch.begin, payout.winch.ramp
 
 
-def longest_period(scene: LineScene) -> float:
+def longest_period(scene: Moving) -> float:
     """The longest period, s, of waves and of motions of the ends; 0 where none is named."""
     return max(_all_periods(scene.ends, scene.environment).values(), default=0.0)
 
 
-def stationary_from(scene: LineScene) -> tuple[float, float] | None:
+def stationary_from(scene: Moving) -> tuple[float, float] | None:
     """From when on (s) all that moves or loads a line is periodic or a stationary sea, and the longest period (s).
 
     None: it is not, or cannot be known: of a file, a velocity, line that is paid out, an end that is let go.
@@ -314,7 +321,7 @@ def prescribed_twist(ends: Ends) -> float:
     return twist
 
 
-def ramp_ends(scene: LineScene) -> list[float]:
+def ramp_ends(scene: Moving) -> list[float]:
     """Times, s, at which something stops growing or moving, or a load turns: a step should end there."""
     fluid, ends = scene.environment.fluid, scene.ends
     moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]

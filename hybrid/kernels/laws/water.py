@@ -131,9 +131,30 @@ LAST = math.log(FADED)
 TO_WHOLE = 1.5 * 2.0**52
 QUARTER_HIGH, QUARTER_LOW = 1.57079632673412561417, 6.07710050650619224932e-11
 # Coefficients of Taylor's series of sine, cosine and exponential.
-S3, S5, S7, S9, S11, S13, S15 = ((-1.0) ** (n // 2) / math.factorial(n) for n in range(3, 16, 2))
-C2, C4, C6, C8, C10, C12, C14, C16 = ((-1.0) ** (n // 2) / math.factorial(n) for n in range(2, 17, 2))
-E2, E3, E4, E5, E6, E7, E8, E9, E10 = (1.0 / math.factorial(n) for n in range(2, 11))
+S3 = -1.0 / math.factorial(3)
+S5 = 1.0 / math.factorial(5)
+S7 = -1.0 / math.factorial(7)
+S9 = 1.0 / math.factorial(9)
+S11 = -1.0 / math.factorial(11)
+S13 = 1.0 / math.factorial(13)
+S15 = -1.0 / math.factorial(15)
+C2 = -1.0 / math.factorial(2)
+C4 = 1.0 / math.factorial(4)
+C6 = -1.0 / math.factorial(6)
+C8 = 1.0 / math.factorial(8)
+C10 = -1.0 / math.factorial(10)
+C12 = 1.0 / math.factorial(12)
+C14 = -1.0 / math.factorial(14)
+C16 = 1.0 / math.factorial(16)
+E2 = 1.0 / math.factorial(2)
+E3 = 1.0 / math.factorial(3)
+E4 = 1.0 / math.factorial(4)
+E5 = 1.0 / math.factorial(5)
+E6 = 1.0 / math.factorial(6)
+E7 = 1.0 / math.factorial(7)
+E8 = 1.0 / math.factorial(8)
+E9 = 1.0 / math.factorial(9)
+E10 = 1.0 / math.factorial(10)
 # Wetness coordinates closer than this are one: their difference quotient would lose digits.
 SAME_WETNESS = 1e-4
 

@@ -62,7 +62,12 @@ DAMPING = 21  # N s/m per m
 ONSET_OF = 22  # m
 SLIP = 23  # m, elastic travel
 # Kinds.
-FLAT, ROUND, BOX, TORUS, SHEAVE, MESH = map(float, range(6))
+FLAT = 0.0
+ROUND = 1.0
+BOX = 2.0
+TORUS = 3.0
+SHEAVE = 4.0
+MESH = 5.0
 OBSTACLE = 24
 # Behind them, of a line of several diameters, OF_PIECE numbers for each of its sections.
 PIECE_END = 0  # arc length at which it ends, m
@@ -133,24 +138,54 @@ NO_BOXES: NDArray[np.float64] = np.zeros((0, BOX_ROW))
 NO_FACETS: NDArray[np.float64] = np.zeros((0, FACET))
 
 
-FORCE_A, FORCE_B, MOMENT_A, MOMENT_B = range(0, 12, 3)
-DRAG_POWER, MASS_DAMPING_POWER, STIFFNESS_DAMPING_POWER, RESIDUAL, RESIDUAL_NODE = range(12, 17)
-ADDED_MASS_POWER, WAVE_POWER, CONTACT_WORK, FRICTION_WORK, CONTACT_FORCE, ASSEMBLED = range(17, 23)
-BEND, BEND_NODE, TWIST, TWIST_NODE, SLACKEST, SLACKEST_CELL = range(ASSEMBLED, 28)
-SEABED_ENERGY, PUSH_ENERGY, WRONG_PIVOTS, LOCAL_ERROR, LOCAL_ERROR_NODE = range(28, 33)
-SELF_CONTACT_ENERGY, SELF_FRICTION_WORK, LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = range(33, 38)
-STRETCH_ENERGY, USED_RHO = 38, 39
+FORCE_A = 0
+FORCE_B = 3
+MOMENT_A = 6
+MOMENT_B = 9
+DRAG_POWER = 12
+MASS_DAMPING_POWER = 13
+STIFFNESS_DAMPING_POWER = 14
+RESIDUAL, RESIDUAL_NODE = 15, 16
+ADDED_MASS_POWER, WAVE_POWER = 17, 18
+CONTACT_WORK = 19
+FRICTION_WORK = 20
+CONTACT_FORCE = 21
+ASSEMBLED = 22
+BEND = 22
+BEND_NODE = 23
+TWIST = 24
+TWIST_NODE = 25
+SLACKEST, SLACKEST_CELL = 26, 27
+SEABED_ENERGY = 28
+PUSH_ENERGY, WRONG_PIVOTS = 29, 30
+LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
+SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
+LENGTH_OUT = 35
+PAYOUT_RATE = 36
+PAYOUT_POWER = 37
+STRETCH_ENERGY = 38
+USED_RHO = 39
 NET_A, NET_B = 40, 43
-OBSTACLE_WORK, LOST_WORK, REPORT_SIZE = range(46, 49)
+OBSTACLE_WORK = 46
+LOST_WORK = 47
+REPORT_SIZE = 48
 
 
 # The optional forces: bit in the mask of a line, and what each needs.
 #
 # A force that no scene asked for has its bit off, and its parameters are never read.
 
-DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, FLOW, WAVES, SURFACE, BODIES, SEABED, FRICTION = (
-    1 << bit for bit in range(11)
-)
+DRAG = 1
+ADDED_MASS = 2
+MASS_DAMPING = 4
+STIFFNESS_DAMPING = 8
+ROTARY = 16
+FLOW = 32
+WAVES = 64
+SURFACE = 128
+BODIES = 256
+SEABED = 512
+FRICTION = 1024
 # No force: all of the cable and of what acts on it lies in a plane (hybrid.kernels.algebra.plane).
 PLANAR = 2048
 # Contact of the line with itself (hybrid.kernels.contact.self_contact).
