@@ -305,7 +305,8 @@ class LineJobs:
         carried = [most if is_answered_again(x) else 0 for x, most in zip(lines, self._most_nodes, strict=True)]
         joints = room_of_joints(lines, carried, points, bodies)
         joints |= {"net": self.net, "work": self.body_work}
-        borders, twists = dict[str, Any](joints={}), self._twists  # which change in place
+        twists = self._twists  # which change in place
+        borders: dict[str, Any] = {"joints": {}}
         if self._rides.size:
             borders["shapes"] = self._pressed
         if self._winches:
