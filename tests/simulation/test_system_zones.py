@@ -21,7 +21,7 @@ from hybrid.solve.network_steps import NetworkSteps
 from tests.combinations.pairs import as_network
 from tests.inside import calls_of
 from tests.said import ONE, both_ways, line_of, said
-from tests.scenes import cable_scene, each_line, network_scene, pinned_at
+from tests.scenes import cable_scene, each_line, line_between, network_scene, pinned_at
 from tests.validation.test_validation_lines_contact import force_between, lowered
 
 ROPE = {
@@ -198,20 +198,30 @@ TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 FOLLOWS = {"kind": "adaptive", "curvature_error": SHARE}
 
 
+def followed(**more: Any) -> Tables:
+    """Three ropes to a weight, whose cells follow the curvature."""
+    return each_line(mooring(**more), model=FOLLOWS)
+
+
+ROPE_BETWEEN = {"length": 60.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
+ROPE_BETWEEN |= {"drag": {"normal": 1.2}}
+HEAVED = {"a": {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 2.0, "period": 2.0}, "ramp": 1.0}}}
+HEAVED |= {"b": {"position": [40, 0, 0]}}
+AT_ONCE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 0.1}
+
+
+def heaved(more: Tables = AT_ONCE, **tables: Any) -> Tables:
+    """A rope whose end heaves, and whatever else there is."""
+    line = line_between("a", "b", ROPE_BETWEEN, mesh=20, model=AT_ONCE | more, contact={"self": False})
+    lines, points = tables.pop("lines", {}), tables.pop("points", {})
+    return network_scene(HEAVED | points, {"rope": line} | lines, fluid={"density": 1025}, **tables)
+
+
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "model", [{"hold_time": 0.1}, {"hold_time": 0.1, "curvature_error": 0.05}], ids=["zones", "cells"]
-)
+@pytest.mark.parametrize("model", [{}, {"curvature_error": 0.05}], ids=["zones", "cells"])
 def test_steps_that_follow_the_motion_go_by_zones_and_not_by_pauses(model: Tables, monkeypatch: Any) -> None:
     """A review that lets rods go bounds the next step at once, and not when Python has looked."""
-    rope = {"length": 60.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
-    points = {"a": {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 2.0, "period": 2.0}, "ramp": 1.0}}}
-    line = {"start": "a", "end": "b", "mesh": {"cells": 20}, "model": {"kind": "adaptive", "tolerance": 1e-3} | model}
-    line |= {"sections": [rope | {"drag": {"normal": 1.2}}], "contact": {"self": False}}
-    scene = network_scene(
-        points | {"b": {"position": [40, 0, 0]}}, {"rope": line}, fluid={"density": 1025},
-        time={"duration": 4.0, "step": 0.04, "tolerance": 1e-3}, output={"every": 0.1},
-    )  # fmt: skip
+    scene = heaved(model, time={"duration": 4.0, "step": 0.04, "tolerance": 1e-3}, output={"every": 0.1})
     found = []
     for _ in range(2):
         with hybrid.run(scene) as result:
@@ -220,9 +230,19 @@ def test_steps_that_follow_the_motion_go_by_zones_and_not_by_pauses(model: Table
     assert np.array_equal(*found)
 
 
-def followed(**more: Any) -> Tables:
-    """Three ropes to a weight, whose cells follow the curvature."""
-    return each_line(mooring(**more), model=FOLLOWS)
+@pytest.mark.long
+def test_the_least_clearance_is_that_of_the_cells_of_now() -> None:
+    """That of part of a line begins at its nearest node, which is another one when cells have changed."""
+    gap = {"kind": "clearance", "line": "rope", "other": "far", "range": [3.1, 17.7]}
+    far = {"far": line_between("c", "d", ROPE_BETWEEN | {"length": 51.0}, mesh=20, model="catenary")}
+    scene = heaved(
+        {"curvature_error": 0.05}, lines=far, points={"c": {"position": [60, 25, -5]}, "d": {"position": [60, -25, -5]}},
+        time=(2.5, 0.02), contact={"between": []}, output={"every": 0.02, "quantities": {"gap": gap}},
+    )  # fmt: skip
+    with hybrid.run(scene) as result:
+        assert len({*cells(result.lines["rope"])}) > 1
+        least, most = result["extremes/gap"].ravel()
+        assert least <= result["gap"].min() + 1e-9 and result["gap"].max() <= most + 1e-9
 
 
 def cells(line: hybrid.Result) -> list[int]:

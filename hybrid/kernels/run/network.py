@@ -210,6 +210,16 @@ def note_quantities(table, job, t):
 
 
 @inner
+def note_ranges(tables, t):
+    """The same of all lines as they are: cells may have changed since the step, of one of two that are near each other.
+
+    tables: of steps that lead to the states of now.
+    """
+    for l in range(tables.shape[0]):
+        note_quantities(tables[l], read(tables[l]), t)
+
+
+@inner
 def begin_books_of(table, job, t):
     """Powers and extremes of a line as it is, of which the report is known; t: s, now."""
     line, new, books, report = job.line, job.new, job.books, job.work.report

@@ -20,7 +20,7 @@ from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.energies import pull
-from hybrid.kernels.run.network import error_ratio, is_due, keep_bodies, sample_now, sample_within
+from hybrid.kernels.run.network import error_ratio, is_due, keep_bodies, note_ranges, sample_now, sample_within
 from hybrid.kernels.state.books import (
     ASK_BEFORE,
     ASK_STEPS,
@@ -473,9 +473,11 @@ def sample_network(table):
     Returns 0 where the buffers are full before the last of them, else 1.
     """
     steps = read_steps(table)
-    own = steps.odd if steps.counts.parity else steps.even
+    own, other = (steps.odd, steps.even) if steps.counts.parity else (steps.even, steps.odd)
     if steps.counts.phase == SAMPLE:
         return sample_within(steps, read_network(own))
+    if is_due(steps, 1):
+        note_ranges(read_network(other).tables, steps.clock.now)
     return sample_now(steps, read_network(own))
 
 
