@@ -21,6 +21,7 @@ from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, Outcome
 from hybrid.model.plan import CHOSEN
 from hybrid.scene.checks import CHECKS
 
+pytestmark = pytest.mark.needs("mkdocs-material", "playwright")
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 EQUATIONS: dict[str, Any] = runpy.run_path(str(DOCS / "manual" / "equations.py"))

@@ -304,8 +304,6 @@ def test_pages_and_films_of_jumps_are_made(swing: hybrid.Result, tmp_path: Path)
 
 def test_the_largest_value_may_be_the_one_on_the_right() -> None:
     bent = cantilever()
-    found = along(bent, "curvature")
-    assert [found.side(k) for k in np.flatnonzero(found.s == 0.6)] == [-1, 1] and found.side(0) == 0
     right = float(bent["right/curvature"][0, 0])
     assert right > 1.04 * bent.curvature.max()
     told = fact(bent, "bend")
