@@ -95,6 +95,8 @@ TWICE = {"hybrid.kernels.mesh.remesh.fill_element", "hybrid.kernels.mesh.cell_ch
 TWICE |= {"hybrid.kernels.algebra.block_elimination.substitute"}
 # Read for steps, which have a state and books, and for outputs, whose tables are both: 4 s of the first use of outputs.
 TWICE |= {"hybrid.kernels.watch.extremes.node_pressure", "hybrid.kernels.laws.element.frames_at"}
+# Read for knots in a row and for a column of a table.
+TWICE |= {"hybrid.kernels.algebra.sparse_rows.interval_within"}
 SIDES = "hybrid.kernels.watch.sides."
 
 

@@ -98,10 +98,12 @@ def window(text: str) -> tuple[float | None, float | None]:
 
 
 def option(metavar: str, help: str, *names: str, **how: Any) -> Any:
+    """An option of a command that takes a value; its name is that of its parameter unless names are given."""
     return typer.Option(*names, metavar=metavar, help=help, **how)
 
 
 def argument(metavar: str, help: str) -> Any:
+    """What a command needs, in its place."""
     return typer.Argument(metavar=metavar, help=help, show_default=False)
 
 

@@ -336,10 +336,25 @@ def _half_plane(body: Body, view: View, box: np.ndarray, size: float) -> np.ndar
 
 
 def hull(points: np.ndarray) -> np.ndarray:
-    """The convex hull (m, 2) of points (n, 2), counter-clockwise."""
-    from scipy.spatial import ConvexHull
+    """The convex hull (m, 2) of points (n, 2), counter-clockwise; of points on one line the ends.
 
-    return np.asarray(points[ConvexHull(points).vertices])
+    By its own lines: ConvexHull of scipy refuses points on one line, as of a flat surface seen from its edge.
+    """
+    order = points[np.lexsort(points.T[::-1])]
+
+    def chain(rows: np.ndarray) -> list[np.ndarray]:
+        kept: list[np.ndarray] = []
+        for p in rows:
+            while len(kept) > 1 and _left(kept[-2], kept[-1], p) <= 0.0:
+                kept.pop()
+            kept.append(p)
+        return kept[:-1]
+
+    return np.array(chain(order) + chain(order[::-1]))
+
+
+def _left(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 # ---- in space -----------------------------------------------------------------------------------------

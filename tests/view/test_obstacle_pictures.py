@@ -99,3 +99,8 @@ def test_marks_outside_of_a_panel_are_not_drawn_over_what_is_beside() -> None:
         marks = Marks(np.array([at]), np.array([0.5]), "o")
         draw_panel(Panel("p", "", axis, axis, [marks], aspect=1.0), ax)
         assert ax.lines[-1].get_clip_on() == clipped
+
+
+def test_the_hull_of_points_on_one_line_is_its_ends() -> None:
+    """A flat surface that is seen from its edge."""
+    np.testing.assert_array_equal(hull(np.array([[1.0, 0.5], [0.0, 0.0], [2.0, 1.0], [1.0, 0.5]])), [[0, 0], [2, 1]])

@@ -1,4 +1,4 @@
-"""Matrices that are no rows of blocks: sparse ones by rows, whether one with a narrow band is definite, small dense ones."""
+"""Tables that are no rows of blocks: sparse matrices, narrow bands, small dense ones; where a number lies among knots."""
 
 from __future__ import annotations
 
@@ -196,3 +196,21 @@ def substitute_dense(A, m):
         A[c, m] = y / A[c, c]
     for c in range(m):
         A[c, m] *= A[m, c]
+
+
+@inner
+def interval(knots, x):
+    """The interval of rising knots that x lies in, or is nearest to."""
+    return interval_within(knots, 0, knots.shape[0] - 1, x)
+
+
+@inner
+def interval_within(knots, low, high, x):
+    """As `interval`, of those from knot `low` to knot `high`."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        if knots[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low

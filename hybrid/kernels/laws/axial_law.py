@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
-from hybrid.kernels.laws.seabed import interval_within
+from hybrid.kernels.algebra.sparse_rows import interval_within
 from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.state.report import LOST_WORK, STRETCH_ENERGY
 from hybrid.kernels.state.state import WORKING, blank_state, on_line

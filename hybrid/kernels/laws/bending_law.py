@@ -58,6 +58,7 @@ from hybrid.kernels.algebra.rotations import (
     scale,
     vec_mat,
 )
+from hybrid.kernels.algebra.sparse_rows import interval_within
 from hybrid.kernels.laws.element import (
     bending,
     damped_bending,
@@ -68,7 +69,6 @@ from hybrid.kernels.laws.element import (
     swivel,
     turns_freely,
 )
-from hybrid.kernels.laws.seabed import interval_within
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import AXIAL_LAW, BENDING_LAW, BENDING_SLIP, LOST_WORK
 from hybrid.kernels.state.state import blank_state, no_ends, no_work, on_line

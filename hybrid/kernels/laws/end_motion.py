@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, hat, mat_mat, mat_vec, scale, stack, transport
+from hybrid.kernels.algebra.sparse_rows import interval_within
 from hybrid.kernels.laws.element import chord
-from hybrid.kernels.laws.seabed import interval_within
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import NOT_ON_BODY, PLACE_THERE, RIDES, SEAT_THERE, TURNS_FREELY
 

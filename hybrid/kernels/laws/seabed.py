@@ -63,29 +63,12 @@ import math
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, outer, scale, stack
+from hybrid.kernels.algebra.sparse_rows import interval
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.state.report import BREAKOUT, FRICTION, SOIL
 from hybrid.kernels.state.state import ROWS, Floats, Line, Sea, blank_state, in_sea, no_sea
 
 HEIGHTS = 4  # numbers of a point of the grid: z, zx, zy, zxy
-
-
-@inner
-def interval(knots, x):
-    """The interval of rising knots that x lies in, or is nearest to."""
-    return interval_within(knots, 0, knots.shape[0] - 1, x)
-
-
-@inner
-def interval_within(knots, low, high, x):
-    """As `interval`, of those from knot `low` to knot `high`."""
-    while high - low > 1:
-        middle = (low + high) // 2
-        if knots[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 @inner

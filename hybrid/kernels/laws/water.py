@@ -91,8 +91,8 @@ from hybrid.kernels.algebra.rotations import (
     sub,
     vector,
 )
+from hybrid.kernels.algebra.sparse_rows import interval
 from hybrid.kernels.laws.element import Chord, chord
-from hybrid.kernels.laws.seabed import interval
 from hybrid.kernels.machine.compile import inner, linked_kernel
 from hybrid.kernels.state.report import DRAG_POWER, FLOW, REPORT_SIZE, SURFACE, WAVES
 from hybrid.kernels.state.state import LANES, ROWS, blank_state, in_sea, no_sea

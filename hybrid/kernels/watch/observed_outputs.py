@@ -33,11 +33,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, get9, scale, sub
+from hybrid.kernels.algebra.sparse_rows import interval
 from hybrid.kernels.laws.bending_law import EACH, FROM, KEPT, MOMENT, MOST, STIFF, STIFFENING, STIFFNESS
 from hybrid.kernels.laws.closed_forms import depth_of
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.obstacles import meets, thinner
-from hybrid.kernels.laws.seabed import contact, interval, pressure, with_cell
+from hybrid.kernels.laws.seabed import contact, pressure, with_cell
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import called, inner, kernel
