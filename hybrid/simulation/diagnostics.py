@@ -100,7 +100,7 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED: tuple[str, ...] = ("_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off")
 REMEMBERED += ("_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink", "_weight", "_lay")
-REMEMBERED += ("_knot", "_bent", "_negative")
+REMEMBERED += ("_knot", "_bent", "_negative", "_unbent")
 
 
 class LineStep(NamedTuple):
@@ -123,6 +123,7 @@ class Diagnostics:
         self._fold, self._twist, self._slack = self._bend, UNRESOLVED, model.slack_floor
         self._sunk = SUNK * model.length
         self._within, self._round, self._between = 1.0, False, False
+        self._unbent = np.inf  # s, until when no bend has been told: outputs come after steps that are later
         self._off = OFF * model.length
         self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
@@ -286,7 +287,7 @@ class Diagnostics:
                 "unresolved bend",
                 self._bend_text(node, bend, state.T),
             )
-            self._bend = 1.5 * bend
+            self._bend, self._unbent = 1.5 * bend, min(self._unbent, t)
         if twist > self._twist:
             text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
             self.note(t, twisted, "unresolved twist", text)
@@ -429,8 +430,8 @@ class Diagnostics:
         if joints.size:
             kinked = kinks_at(joints, seen.bends, line.hn)[:, 0] > self._kink
             found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
-        if self._bend <= UNRESOLVED:
-            found |= bool(model.attached) | seen.has_element(0) | seen.has_element(1)
+        layers = bool(model.attached) | seen.has_element(0) | seen.has_element(1)
+        found |= layers & (seen.batch.t < self._unbent)
         if not self._weight:
             nodes, _, limits = too_long_for_weight(model.cable, line)
             if nodes.size:
@@ -632,27 +633,27 @@ class Diagnostics:
     def _layers(self, batch: Batch) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
         line, last = self._model.line, self._model.line.h.size
-        if self._bend > UNRESOLVED or not line.element.any():
+        if batch.t[0] >= self._unbent or not line.element.any():
             return
         d = batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
         tangents = batch.frame[:, :, 2::3]
         ends = [(0, tangents[:, 0], d[:, 0]), (last, d[:, -1], tangents[:, 1])]
         inner = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
+        found = list[tuple[int, int, float]]()
         for node, before, after in [*ends, *((i, d[:, i - 1], d[:, i]) for i in inner if 0 < i < last)]:
             beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
             if not line.element[node] or not beside:
                 continue
             cell, stiffness = min(node, last - 1), batch.stiffness(node, line)[:, :2].max(axis=1) * line.hn[node]
-            thin = batch.T[:, cell] * line.h[cell] ** 2 > stiffness
+            thin = (batch.T[:, cell] * line.h[cell] ** 2 > stiffness) & (batch.t < self._unbent)
             angle = np.linalg.norm(after - before, axis=1) - float(np.linalg.norm(line.k0[node, :2]))
             smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / line.hn[i] for i in beside], axis=0)
             bad = np.flatnonzero(thin & (angle > ASKEW) & (smooth < LAYER * angle / line.hn[node]))
-            if bad.size:
-                k = int(bad[0])
-                text = self._bend_text(node, float(angle[k]), batch.T[k])
-                self.note(float(batch.t[k]), node, "unresolved bend", text)
-                self._bend = 1.5 * UNRESOLVED
-                return
+            found += [(int(k), node, float(angle[k])) for k in bad[:1]]
+        if found:
+            k, node, bend = min(found)
+            self.note(float(batch.t[k]), node, "unresolved bend", self._bend_text(node, bend, batch.T[k]))
+            self._unbent = float(batch.t[k])
 
     def _bends_by_weight(self, seen: Observation) -> None:
         """Bends of a rod almost without tension that are shorter than its cells."""

@@ -97,6 +97,20 @@ def test_errors_of_fixed_steps_are_those_of_such_cells() -> None:
     assert 0.3 * off < float(result["errors/total/curvature"][0, 0]) < 6.0 * off + 1e-3 * true
 
 
+def test_a_layer_is_told_at_its_output_however_long_the_run_goes_on() -> None:
+    """Outputs are looked at together, after later steps that bend the line beyond its mesh."""
+    turned = CLAMP | {"tangent": [1, 0, 0], "motion": {"pitch": {"amplitude": 80, "period": 8}, "ramp": 1.0}}
+    cable = {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e5, "bending_stiffness": 0.5}]}
+    held = {"ends": {"start": turned, "end": PIN | {"position": [10.01, 0, 0]}}, "environment": {"gravity": 0}}
+    times = []
+    for duration in (0.1, 1.0):
+        asked = scene(cable, mesh={"cells": 20}, time={"duration": duration, "step": 0.05}, output={"every": 0.1})
+        found = hybrid.run(hybrid.validate_scene(asked | held)).events
+        times.append([x.t for x in found if x.kind == "unresolved bend"])
+    assert times[0] == pytest.approx([0.1]) and len(times[1]) > 3
+    assert times[1][:2] == pytest.approx([0.1, 0.2])
+
+
 # ---- the defect ------------------------------------------------------------------------------------
 
 
