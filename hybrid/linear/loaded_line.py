@@ -217,8 +217,10 @@ class LoadedLine:
         count = self.line.s.size
         calm = self.line._replace(bits=self.line.bits & ~DRAG, point_drag=0.0 * self.line.point_drag)
 
-        rows = np.zeros((count, SIZE * WIDTH))
-        march = RestMarch(calm._replace(bits=calm.bits | WAVES), x.ends, state, rows)
+        rows, held = np.zeros((count, SIZE * WIDTH)), x.ends.held.copy()
+        held[np.asarray(x.joints) >= 0] = 0  # the row of a held start has no forces
+        ends = x.ends._replace(held=held)
+        march = RestMarch(calm._replace(bits=calm.bits | WAVES), ends, state, rows)
 
         def rows_of(sea: Sea) -> Floats:
             rows[:] = 0.0
@@ -227,8 +229,8 @@ class LoadedLine:
 
         self.excited: list[Excitation] = excitations_of(model, x.line, state, omegas, rows_of)
         still, moving = np.zeros((count, SIZE * WIDTH)), np.zeros((count, SIZE * WIDTH))
-        rows_at_rest(calm, x, x.ends, state, (0.0, ANCHOR), still)
-        rows_at_rest(calm, x, x.ends, state, (1.0, ANCHOR), moving)
+        rows_at_rest(calm, x, ends, state, (0.0, ANCHOR), still)
+        rows_at_rest(calm, x, ends, state, (1.0, ANCHOR), moving)
         self.forces, self.water, self.shifts, self.turns = (
             np.array([getattr(e, of) for e in self.excited], complex).reshape(len(omegas), rows, 3)
             for of, rows in (("forces", count), ("water", count), ("shifts", 2), ("turns", 2))
@@ -350,7 +352,7 @@ class LoadedLine:
         a1, d = self.x.ends.frame.reshape(2, 3, 3)[0, :, [0, 2]]
         if k:
             a1, d = self.linear.state.a1[-1], self.linear.state.e[-1]
-        about = np.cross(d / np.linalg.norm(d), axes[-k, 0]) * size[-k] * length[-k]
+        about = np.cross(self.linear.t[-k], axes[-k, 0]) * size[-k] * length[-k]
         return float(about @ a1), float(about @ np.cross(d / np.linalg.norm(d), a1))
 
     @cached_property

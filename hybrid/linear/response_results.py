@@ -291,9 +291,15 @@ class LineResponse:
             (deviation >= OF_LARGEST * deviation.max()) & (self.left_out.get(name, 0.0) <= ADDED.get(name, np.inf))
         )
 
+    def _of_size(self) -> LineSpectrum:
+        """Power (F, N+1) of curvature by where the bend points: of any axes across the line the same."""
+        x, points = np.stack([self.curvature, self.curvature_across], axis=2), self.covariance
+        points[:, 0, 0] += self.mean_curvature**2
+        return LineSpectrum(self.f, 0.5 * np.einsum("fni,nij,fnj->fn", x.conj(), points, x).real)
+
     def period(self, name: str) -> Floats:
         """Mean period between up-crossings, s."""
-        spectrum = self.spectrum(name)
+        spectrum = self._of_size() if name == "curvature" else self.spectrum(name)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.sqrt(spectrum.moment(0) / spectrum.moment(2)))
 
@@ -305,7 +311,10 @@ class LineResponse:
         _above_zero("hours", hours)
         period = self.period(name)
         cycles = np.maximum(3600.0 * hours / np.where(period > 0.0, period, np.inf), 1.0)
-        together = np.abs(getattr(self, name)).sum(axis=0)
+        size = np.abs(getattr(self, name))
+        if name == "curvature":
+            size = np.hypot(size, np.abs(self.curvature_across))
+        together = size.sum(axis=0)
         return np.minimum(self.deviation(name) * np.sqrt(2.0 * np.log(cycles)), together)
 
     def damage(self, curve: str | Mapping[str, float | str] | Curve, strength: float, hours: float = HOURS) -> Floats:

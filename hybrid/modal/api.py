@@ -207,7 +207,8 @@ class _Shape:
         """The mode; error: of w, as a part of it."""
         period = 2.0 * math.pi / math.sqrt(self.square)
         shifts = {name: x[:, 1:4] for name, x in self.parts.items()}
-        largest = max(float(np.abs(x).max(initial=0.0)) for x in [*shifts.values(), *self.bodies.values()])
+        moves = [*shifts.values(), *(x.reshape(2, 3) for x in self.bodies.values())]
+        largest = max(float(np.linalg.norm(x, axis=1).max(initial=0.0)) for x in moves)
         twists = {x.name: self.parts[x.name][:-1, 4] for x in self.found.network.lines if x.line.spin.any()}
         if not largest > 1e-9 * max([float(np.abs(x).max(initial=0.0)) for x in twists.values()], default=0.0):
             largest = max(float(np.abs(x).max()) for x in twists.values())  # twist alone: its largest turn is 1 rad
@@ -584,30 +585,39 @@ class _Linear:
 
 # A response by frequency held against a run in time of the same scene.
 
-# Part of the run that is left out, in which the motion begins; outputs to the shortest period that counts.
+# Part of the run that is left out, in which the motion begins, or its ramps; outputs to the shortest period of all.
 BEGINS, PER_PERIOD = 0.25, 12
 # Steps of a scene that names none, of that period.
 STEPS = 60
 CHECKED = ("tension", "curvature")
 
 
+def _ramps(tables: Any) -> Iterator[float]:
+    """Times, s, over which something in the tables of a scene grows."""
+    for key, x in tables.items() if isinstance(tables, dict) else enumerate(tables) if isinstance(tables, list) else ():
+        if key == "ramp" and x:
+            yield float(x)
+        yield from _ramps(x)
+
+
 def compared(asked: Scene, lines: Mapping[str, LineResponse], duration: float) -> dict[str, tuple[float, float]]:
     """Standard deviations where each quantity varies most, by frequency and in a run of `duration` (s)."""
     if not 0.0 < duration < np.inf:
         raise SceneError([Complaint("check", f"{duration:g}", "a time > 0, in s", "--check 600")])
-    periods = [float(np.median(x.period("tension")[x.period("tension") > 0.0])) for x in lines.values()]
-    period = min(periods)
+    periods = [period[period > 0.0] for x in lines.values() for period in (x.period("tension"), x.period("position"))]
+    period = min(float(np.median(x)) for x in periods if x.size)
     data: dict[str, Any] = asked.model_dump(mode="json", exclude_none=True)
     time = asked.time
     step = time.step if time is not None and time.step is not None else period / STEPS
-    data["time"] = {"duration": duration / (1.0 - BEGINS), "step": step}
+    begins = max(BEGINS * duration / (1.0 - BEGINS), *_ramps(data))
+    data["time"] = {"duration": duration + begins, "step": step}
     data["output"] = {"every": period / PER_PERIOD}
     data.pop("accuracy", None)
     result: Any = run(as_scene(data))
     found = {}
     for name, line in lines.items():
         one = result.lines[name] if result.lines else result
-        late = one.times > BEGINS * duration / (1.0 - BEGINS)
+        late = one.times > begins
         for what in CHECKED:
             deviation = line.deviation(what)
             places = line.middle if what == "tension" else line.s

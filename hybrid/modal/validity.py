@@ -47,6 +47,8 @@ OF_MOVED = 0.025
 # That where free points, bodies or heavy floats with drag move it, of which up to three times as much comes true near a
 # resonance that only this damps: 3 % (test_resonance of bench/test_bench_response.py).
 OF_DRAGGED = 0.01
+# Part from which on it is only told that it is more: the linear deviation may be none at all.
+MANY = 10.0
 # Part of a line on which curvature has to be known at least.
 FEW_PLACES = 0.05
 
@@ -60,7 +62,10 @@ def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
 def _slack(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Where tension would be below zero, or of a rod that is compressed at rest above."""
     tension, deviation = found.mean_tension, found.deviation("tension")
-    slack = ndtr(-np.abs(tension) / np.maximum(deviation, 1e-300))
+    if x.phases is None:
+        slack = ndtr(-np.abs(tension) / np.maximum(deviation, 1e-300))
+    else:  # a sum of few harmonics has no tails
+        slack = (np.sign(tension) * (tension + (x.phases @ found.tension).real) < 0.0).mean(axis=0)
     k = int(slack.argmax())
     if slack[k] > SLACK_SHARE:
         side = "below" if tension[k] >= 0.0 else "above"
@@ -208,10 +213,11 @@ def _left_out(x: LoadedLine, found: LineResponse) -> Iterator[str]:
         moved = x.shifts.any() or x.turns.any() or max(x.x.joints) >= 0
         of_moved = OF_DRAGGED if x.by_drag else OF_MOVED
         if added[k] > (of_moved if (moved or x.by_drag) and name == "tension" else MOST_ADDED[name]):
+            more = f"up to {100.0 * part[k]:.2g}" if part[k] < MANY else f"more than {100.0 * MANY:g}"
             what, remedy = ", of points, floats and bodies too,", "; near a resonance it is more: run it in time"
             yield (
                 f"{name} at s = {places[k]:.4g} m: the rest of quadratic drag{what if x.by_drag else ''} and the "
-                f"stretch by swinging would add up to {100.0 * part[k]:.2g} % to its standard deviation of "
+                f"stretch by swinging would add {more} % to its standard deviation of "
                 f"{deviation[k]:.3g} {unit}{remedy if x.by_drag else ''}"
             )
 

@@ -255,6 +255,12 @@ def _moving_obstacles(tables: Tables) -> Iterator[Place]:
     return (("obstacles", name) for name, x in (tables.get("obstacles") or {}).items() if getattr(x, "moves", False))
 
 
+def _prescribed_obstacles(tables: Tables) -> Iterator[Place]:
+    """Obstacles whose motion is given."""
+    obstacles = tables.get("obstacles") or {}
+    return (("obstacles", name, "motion") for name, x in obstacles.items() if getattr(x, "motion", None))
+
+
 def _lines_touch(tables: Tables) -> Iterator[Place]:
     """A line of several that touches another one."""
     if NETWORK in tables and any(tables[LINE] in pair for pair in tables[NETWORK].touching_pairs):
@@ -318,6 +324,7 @@ PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out("end"))
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
+PRESCRIBED_OBSTACLES = Feature("obstacles whose motion is given", "obstacles.NAME.motion", _prescribed_obstacles)
 GOES_ITS_WAY = Feature(
     "contact of lines with each other, with bodies, with obstacles that move",
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
@@ -387,6 +394,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         FINITE_WAVES, RESPONSE, "physics", "a response by frequency is linear in the waves, and these are not",
         "waves of another kind", "kind: regular has the same height and period; hybrid run computes these in time",
+    ),
+    Refusal(
+        PRESCRIBED_OBSTACLES, RESPONSE, "not worked out",
+        "in a response by frequency obstacles rest, or move with what carries them",
+        fix="leave it out; hybrid run computes it in time",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

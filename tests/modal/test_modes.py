@@ -368,3 +368,9 @@ def test_blocks_find_the_modes_of_the_whole_matrix(made) -> None:
         np.sort(by(network.stiffness, network.mass, -1e-3 * network.slow, 20)[0])[:16] for by in (_every, _nearest)
     ]
     assert np.abs(found[1] / found[0] - 1.0).max() < 1e-9
+
+
+def test_the_largest_shift_of_a_mode_is_1_m_whatever_its_direction():
+    for turned in (0.0, 0.7):
+        found = hybrid.modes(sag(20, 100.0 * math.cos(turned), 100.0 * math.sin(turned)), count=3).modes
+        assert [np.linalg.norm(x.shifts["cable"], axis=1).max() for x in found] == pytest.approx([1.0] * 3)

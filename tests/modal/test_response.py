@@ -409,3 +409,112 @@ def test_a_mast_and_a_hanging_line_with_a_free_end_are_answered(held: str) -> No
     scene["ends"] = {"start": foot, "end": "free"}
     found = hybrid.response(scene)
     assert (up * found.lines["cable"].mean_tension < 0.0).all() and found.valid_for("tension"), found.notes
+
+
+# --- said in another way --------------------------------------------------------------------------
+
+FLUID = {"density": 1025.0}
+TAUT = {"length": 100.0, "mass": 1.0, "diameter": 0.05, "axial_stiffness": 1e6}
+
+
+def between(section, a, b, motion, **more):
+    ends = {"start": {"kind": "pinned", "position": a}, "end": {"kind": "pinned", "position": b, "motion": motion}}
+    return {"cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "mesh": {"cells": 20}} | more
+
+
+def buoy(turned):
+    """A buoy on two lines in waves; turned: lines run from the buoy to the anchors."""
+    section = {"length": 56.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e6, "drag": {"normal": 1.2},
+               "added_mass": {"normal": 1.0}, "damping": {"stiffness": 0.05}}  # fmt: skip
+    points = {k: {"position": [x, 0, -50]} for k, x in (("a", -30.0), ("b", 30.0))}
+    points["buoy"] = {"kind": "free", "initial_guess": [0, 0, -3], "mass": 500, "volume": 2, "height": 1.5,
+                      "drag_area": 1, "added_mass": 1000}  # fmt: skip
+    ends = [("buoy", k) if turned else (k, "buoy") for k in "ab"]
+    lines = {k: {"start": x, "end": y, "sections": [section], "model": "catenary", "mesh": {"cells": 20}}
+             for k, (x, y) in zip("ab", ends, strict=True)}  # fmt: skip
+    fluid = FLUID | {"surface": 0.0, "waves": {"kind": "regular", "height": 0.5, "period": 7.0, "ramp": 14.0}}
+    return {"environment": {"fluid": fluid}, "points": points, "lines": lines}
+
+
+def test_waves_push_a_point_whatever_way_its_lines_run():
+    one, two = (hybrid.response(buoy(turned)) for turned in (False, True))
+    np.testing.assert_allclose(one.points["buoy"], two.points["buoy"], rtol=1e-9, atol=1e-12)
+
+
+def test_a_motion_of_an_obstacle_is_refused_in_a_response():
+    moves = {"heave": {"amplitude": 0.02, "period": 6.0}, "ramp": 12.0}
+    roller = {"kind": "cylinder", "at": [50, 0, -3], "axis": [0, 1, 0], "radius": 1.0, "motion": moves}
+    section = TAUT | {"length": 101.0, "bending_stiffness": 100.0}
+    start = {"kind": "equilibrium", "points": [[0, 0, -10], [50, 0, -1.9], [100, 0, -10]]}
+    surge = {"surge": {"amplitude": 0.01, "period": 6.0}, "ramp": 12.0}
+    scene = between(
+        section, [0, 0, -10], [100, 0, -10], surge, initial=start, model="rod", obstacles={"roller": roller}
+    )
+    with pytest.raises(hybrid.SceneError, match=r"obstacles\.roller\.motion"):
+        hybrid.response(scene)
+
+
+def test_a_harmonic_that_never_slackens_a_line_is_valid():
+    motion = {"heave": {"amplitude": 0.55, "period": 8.0}, "ramp": 16.0}
+    found = hybrid.response(between(TAUT, [0, 0, 0], [0, 0, 101], motion, model="catenary"))
+    line = found.lines["cable"]
+    assert (line.mean_tension > 1.5 * np.abs(line.tension).sum(axis=0)).all()
+    assert found.valid, found.notes
+    motion["heave"]["amplitude"] = 1.1
+    assert "below zero" in str(hybrid.response(between(TAUT, [0, 0, 0], [0, 0, 101], motion, model="catenary")).notes)
+
+
+@pytest.mark.parametrize("other", [0.0, 45.0, 90.0])
+def test_the_largest_curvature_of_a_straight_line_is_the_same_in_all_directions(other):
+    section = TAUT | {"mass": 10.0, "axial_stiffness": 1e8, "bending_stiffness": 2e3, "drag": {"normal": 1.2}}
+
+    def most(angle):
+        amplitude = zip(("surge", "sway"), (np.cos(angle), np.sin(angle)), strict=True)
+        motion = {k: {"amplitude": float(x), "period": 8.0} for k, x in amplitude} | {"ramp": 16.0}
+        scene = between(section, [0, 0, -99], [0, 0, 1.2], motion, environment={"fluid": FLUID})
+        line = hybrid.response(scene).lines["cable"]
+        assert np.isfinite(line.period("curvature")[1:-1]).all()
+        return line.most_probable("curvature").max()
+
+    assert most(np.radians(other)) == pytest.approx(most(0.3), rel=1e-6)
+
+
+def sideways():
+    section = TAUT | {"length": 100.5, "mass": 10.0, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+    motion = {"sway": {"amplitude": 0.1, "period": 8.0}, "ramp": 16.0}
+    return between(section, [0, 0, 0], [100, 0, 0], motion, model="catenary", environment={"fluid": FLUID})
+
+
+def test_a_check_of_a_line_whose_tension_stays():
+    assert hybrid.response(sideways(), check=30.0).checks["tension"][0] == 0.0
+
+
+def test_a_check_begins_after_the_ramps():
+    motion = {"heave": {"amplitude": 0.3, "period": 8.0}, "ramp": 100.0}
+    found = hybrid.response(between(TAUT, [0, 0, 0], [0, 0, 101], motion, model="catenary"), check=40.0)
+    assert found.valid, found.notes
+
+
+def test_what_is_added_to_nothing_is_no_number():
+    assert "more than 1000 %" in str(hybrid.response(sideways()).notes)
+
+
+def test_a_bend_at_a_spring_with_layers_is_the_same_at_either_end():
+    section = {"length": 100.0, "mass": 10.0, "diameter": 0.06, "axial_stiffness": 1e7, "bending_stiffness": 1e3,
+               "torsional_stiffness": 1e3, "bending_slip": [{"stiffness": 4e3, "moment": 40.0}]}  # fmt: skip
+
+    def mean(turned):
+        way = -1.0 if turned else 1.0
+        low = {"kind": "clamped", "position": [0, 0, -50], "tangent": [way, 0, 0.2 * way], "normal": [0, 1, 0],
+               "bend_stiffness": 300.0}  # fmt: skip
+        top = {
+            "kind": "pinned",
+            "position": [70, 0, 0],
+            "motion": {"heave": {"amplitude": 0.1, "period": 8}, "ramp": 16},
+        }
+        ends = dict(zip(("start", "end"), (top, low) if turned else (low, top), strict=True))
+        scene = {"cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": "rod"}
+        found = hybrid.response(scene | {"mesh": {"cells": 60}, "environment": {"fluid": FLUID}}).lines["cable"]
+        return found.mean_curvature[-1 if turned else 0]
+
+    assert mean(True) == pytest.approx(mean(False), rel=1e-6)

@@ -363,6 +363,10 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
+    (c.PRESCRIBED_OBSTACLES, c.RESPONSE): (
+        {"obstacles": {"roller": {"kind": "sphere", "at": [0, 0, -50], "radius": 1,
+                                  "motion": {"heave": {"amplitude": 0.1, "period": 6}, "ramp": 9}}}}, "response"
+    ),
 }  # fmt: skip
 # Other examples of pairs whose one reason is that of several features.
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
