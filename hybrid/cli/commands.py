@@ -124,6 +124,10 @@ def report(
 ) -> None:
     """Write one HTML file that explains a result, lays several over each other, or shows a study."""
     result = results[0]
+    if modes and (len(results) > 1 or result.is_dir()):
+        raise UsageError("--modes: of the page of one result")
+    if line is not None and result.is_dir():
+        raise UsageError("--line: of a result, not of a study")
     if len(results) > 1:
         _comparison(results, output, line, overwrite, session(as_json, quiet))
         return
@@ -436,6 +440,9 @@ def trade(
         from hybrid.studies.tradeoff import PEERS_ARE
 
         raise UsageError(f"--peers: {PEERS_ARE}")
+    given = {"--models": models, "--accuracies": accuracies, "--reference": reference, "--for": target != "1%" or None}
+    if levels and (unfit := [name for name, value in given.items() if value is not None]):
+        raise UsageError(f"{', '.join(unfit)}: --levels has models, accuracies and a reference of its own")
     with session(as_json, quiet) as console:
         from hybrid.cli.tables import judged, trade_table
 

@@ -305,6 +305,11 @@ def study(
         )
     if derivatives and sensitivity is None:
         raise UsageError("--derivatives goes with --sensitivity RESULT")
+    of_runs = {"--workers": workers, "--scheduler": scheduler, "--batch": batch, "--netcdf": netcdf}
+    of_runs |= {"--overwrite": overwrite or None, "--output": output if case is None else None}
+    of_runs |= {"--sensitivity": sensitivity if case is not None else None}
+    if (case, sensitivity) != (None, None) and (unfit := [k for k, x in of_runs.items() if x is not None]):
+        raise UsageError(f"{', '.join(unfit)}: not with {'--case' if case is not None else '--sensitivity'}")
     with session(as_json, quiet) as console:
         if netcdf is not None:
             from hybrid.store.reader import check_target

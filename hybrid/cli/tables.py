@@ -519,6 +519,8 @@ def check_holding(asked: Any, stiffness: str | None, offsets: str | None, reach:
     """SceneError where what is asked cannot be had, before anything is computed."""
     if reach is not None and offsets is None:
         raise SceneError([Complaint("--reach", f"{reach:g}", "a point or body to shift", "--offsets point:NAME")])
+    if heading and offsets is None:
+        raise SceneError([Complaint("--heading", f"{heading:g}", "a point or body to shift", "--offsets point:NAME")])
     given = {name: at for name, at in (("--stiffness", stiffness), ("--offsets", offsets)) if at is not None}
     if given:
         from hybrid.simulation.lines_stiffness import target_of

@@ -97,7 +97,7 @@ class MoorDyn:
         self.scene: Any = read_text(self.text)[0]
         scene = self.scene
         names = {
-            id: f"point{id}" if f"point{id}" in scene.points else f"body{p.on}" for id, p in self.deck.points.items()
+            id: f"body{p.on}" if f"body{p.on}" in scene.points else f"point{id}" for id, p in self.deck.points.items()
         }
         self.points = [MoorDynPoint(self, id, names[id]) for id in sorted(names)]
         fairleads = {name: p for name, p in scene.points.items() if isinstance(p, Fairlead)}
@@ -120,8 +120,17 @@ class MoorDyn:
             for p in self.deck.points.values()
             if p.has_loads and (p.kind == "coupled" or (p.kind == "body" and p.on in moved))
         ]
-        expected = "no mass, volume or drag on what the caller moves; its force is that of the lines"
-        fix = "write 0 there, and count the weight, lift and drag in the program that calls"
+        bending = [line for line in self.deck.lines.values() if self.deck.types[line.type].ei > 0.0]
+        clamps = {id for line in bending for kind, id, _ in line.ends if kind == "rod"}
+        for id, rod in self.deck.rods.items():
+            carried = rod.kind == "body" and rod.on in moved
+            if rod.kind.startswith("coupled") or (carried and (rod.segments or id in clamps)):
+                rows.append(rod.row)
+        expected = (
+            "no mass, volume or drag on what the caller moves, and no rod that is coupled, has length or holds a line "
+            "that bends; its force is that of the lines"
+        )
+        fix = "write 0 there, or a point, and count the weight, lift and drag in the program that calls"
         if rows:
             raise SceneError([Complaint("left out", r.shown, expected, fix, r.line) for r in rows], self.deck.file)
 
@@ -203,6 +212,8 @@ class MoorDyn:
 
     def point(self, name: str) -> PointState:
         """A point now; before `Init` where the deck has it, at rest, without force."""
+        if self.scene is not None and name not in self.scene.points:
+            raise ValueError(f"{name}: expected a point that holds a line; others have no place in the scene")
         if self.simulation is None and self.origin == inf and not self.closed:
             place = self.first_places()[name][0] if self.scene is None else self.scene.first_place(name)
             return _unloaded(np.array(place, float), np.zeros(3))

@@ -284,7 +284,7 @@ def parse_wanted(asked: Scene, text: str, moves: bool) -> Wanted:
         expected = f"a section of the line, which has {len(cable.sections)}, counted from 0"
         raise SceneError([Complaint("of", text, expected, f"sections[{len(cable.sections) - 1}]")])
     s = None if section is not None else _place_of(text, at, cable.length)
-    refuse_parts(name, axis or "", "" if moves else over or "", s)
+    refuse_parts(name, axis or "", "" if moves else over or "", s if section is None else 0.0)
     if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
         fix = f"{text}@end" if moves else f"{name}@0, max {name}"
         raise SceneError([Complaint("of", text, "a place" if moves else "a place or an extreme", fix)])

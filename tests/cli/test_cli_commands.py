@@ -324,6 +324,12 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("stats", "wire.h5", "--hours", "nan"), "nan is no time"),
         (("stats", "wire.h5", "--strength", "1e6"), "add --curve"),
         (("stats", "wire.h5", "--section", "1,2,3"), "add --curve"),
+        (("report", "a.h5", "b.h5", "--modes", "3"), "--modes: of the page of one result"),
+        (("report", ".", "--modes", "3"), "--modes: of the page of one result"),
+        (("report", ".", "--line", "x"), "--line: of a result"),
+        (("trade", "wire.yaml", "--levels", "--models", "rod"), "--models: --levels has"),
+        (("study", "wire.yaml", "--case", "0", "--sensitivity", "tension_max"), "--sensitivity: not with --case"),
+        (("study", "wire.yaml", "--case", "0", "--netcdf", "x.nc"), "--netcdf: not with --case"),
     ],
 )
 def test_input_that_is_refused(call: Call, arguments: tuple[str, ...], words: str) -> None:
@@ -344,6 +350,7 @@ def test_input_that_is_refused(call: Call, arguments: tuple[str, ...], words: st
         (("--offsets", "point:ring", "--reach", "inf"), "--reach"),
         (("--offsets", "point:ring", "--reach", "1", "--heading", "nan"), "--heading"),
         (("--reach", "1"), "--reach"),
+        (("--heading", "90"), "--heading"),
         (("--set", "time.step"), "override"),
     ],
 )

@@ -63,6 +63,40 @@ def test_loads_of_what_the_caller_moves_are_refused(what: str, tmp_path: Path) -
         moordyn.Create(str(tmp_path / "deck.txt"))
 
 
+@pytest.mark.parametrize(("stiffness", "rods", "said"), [
+    (0.0, ["1 light Body1 1 0 0 1 0 0 0 -"], ""),
+    (5e6, ["1 light Body1 1 0 0 1 1 0 0 -"], "no rod that is coupled, has length or holds a line that bends"),
+    (0.0, ["1 light Body1 1 0 0 1 1 0 2 -"], "has length"),
+    (0.0, ["1 light Coupled 40 0 -14 40 1 -14 0 -"], "that is coupled"),
+])  # fmt: skip
+def test_rods_that_the_caller_would_turn_are_refused(
+    stiffness: float, rods: list[str], said: str, tmp_path: Path
+) -> None:
+    """Their axes were taken for inertial ones, and their moments left out."""
+    text = (
+        on_a_body(tmp_path / "deck.txt").read_text(encoding="utf-8").replace("-1.0       0  ", f"-1.0  {stiffness}", 1)
+    )
+    table = ["--- ROD TYPES ---", "TypeName Diam Mass/m Cd Ca CdEnd CaEnd", "(-) (m) (kg/m) (-) (-) (-) (-)",
+             "light 0.2 0 0 0 0 0", "--- RODS ---", "ID RodType Attachment Xa Ya Za Xb Yb Zb NumSegs Outputs",
+             "(#) (-) (-) (m) (m) (m) (m) (m) (m) (-) (-)", *rods, "---------------------- POINTS"]  # fmt: skip
+    text = text.replace("---------------------- POINTS", "\n".join(table)).replace("1        4  ", "1        R1A")
+    (tmp_path / "deck.txt").write_text(text, encoding="utf-8")
+    if not said:
+        assert moordyn.NCoupledDOF(moordyn.Create(str(tmp_path / "deck.txt"))) == 6
+        return
+    with pytest.raises(hybrid.SceneError, match=said):
+        moordyn.Create(str(tmp_path / "deck.txt"))
+
+
+def test_a_point_that_holds_no_line_has_no_place(tmp_path: Path) -> None:
+    row = "6    Coupled      -20    -34.64   -14    0      0       0      0\n"
+    path = tmp_path / "deck.txt"
+    path.write_text(DECK.read_text(encoding="utf-8").replace(row, f"{row}7 Fixed 1 1 -5 0 0 0 0\n"), encoding="utf-8")
+    network = moordyn.Create(str(path))
+    with pytest.raises(ValueError, match="point7: expected a point that holds a line"):
+        moordyn.GetPointPos(moordyn.GetPoint(network, 7))
+
+
 def test_it_starts_from_the_equilibrium_of_the_imported_scene() -> None:
     network = started()
     result = hybrid.static(next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene)

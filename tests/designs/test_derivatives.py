@@ -184,6 +184,7 @@ def test_what_is_refused():
         ("tension.x@0", key, "no components"),
         ("max reaction_end.z", key, "one value for the whole line"),
         ("reaction_end.z@20", key, "one value for the whole line"),
+        ("reaction_end.z@sections[0]", key, "one value for the whole line"),
         ("tension@0", "cable.sections[3].mass", "a key of the scene"),
         ("tension@0", "model", "a number"),
     ):

@@ -135,6 +135,8 @@ def test_a_clamp_is_a_rod_without_length(tmp_path: Path) -> None:
     [
         ({"environment": {"fluid": {"density": 1025}, "seabed": {"z": -100, "stiffness": 1e4, "slope": [0.01, 0]}}}, "environment.seabed.slope", "level"),
         ({"cable": {"sections": [{"length": 250, "mass": 20}]}}, "cable.sections[0].axial_stiffness", "springs"),
+        ({"cable": {"sections": [{"length": 250, "mass": 20, "axial_stiffness": 2e8, "creep": {"per_decade": 2e-3, "loaded": 9}}]}},
+         "cable.sections[0].creep", "axial_stiffness alone"),
         ({"ends": {"start": {"kind": "pinned", "position": [0, 0, -99]}, "end": {"kind": "free", "force": [9e4, 0, 9e4]}}},
          "ends.end", "no force"),
     ],
@@ -167,6 +169,20 @@ def test_currents_and_waves_are_named(tmp_path: Path) -> None:
     }
     notes = deck_of(Straight(hybrid.validate_scene(data))).notes
     assert [note.split(" ")[0] for note in notes] == ["environment.fluid.current", "environment.fluid.waves"]
+
+
+@pytest.mark.parametrize(("z", "notes"), [(-0.3, 1), (-5.0, 0)])
+def test_a_buoy_that_floats_at_the_surface_is_named(z: float, notes: int) -> None:
+    """MoorDyn has it 4.5 m above the water, where the scene has 0.3 m below."""
+    points = {
+        "buoy": {"kind": "free", "mass": 500, "volume": 6, "height": 2, "initial_guess": [0, 0, z]},
+        "anchor": {"position": [0, 40, -40]},
+    }
+    section = {"length": 66, "mass": 20, "diameter": 0.05, "axial_stiffness": 2e7}
+    line = line_between("anchor", "buoy", section, mesh=20, model="catenary")
+    scene = network_scene(points, {"a": line}, fluid={"density": 1025, "surface": 0})
+    found = deck_of(Straight(hybrid.validate_scene(scene))).notes
+    assert sum("whole volume; hybrid only where it is wet" in x for x in found) == notes
 
 
 def test_a_deck_that_is_there_is_kept(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.tables import NEAR, body_row
+from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.cable import AddedMass, Drag, Section
 from hybrid.scene.read import read_text
 
@@ -118,8 +119,10 @@ class _Lump:
     volume: float = 0.0
     drag_area: float = 0.0
     added_mass: float = 0.0
+    height: float = 0.0  # m
 
     def add(self, item: Any, volume: float) -> None:
+        self.height = max(self.height, item.height or sphere_diameter(volume))
         self.mass += item.mass
         self.volume += volume
         self.drag_area += item.drag_area
@@ -318,7 +321,8 @@ class _Writer:
 
     def _type(self, where: str, section: Section) -> str:
         if section.curve is not None:
-            key = next(x for x in ("syrope", "dynamic_stiffness", "tension_strain") if getattr(section, x) is not None)
+            known = "syrope", "dynamic_stiffness", "creep", "tension_strain"
+            key = next(x for x in known if getattr(section, x) is not None)
             fix = "give axial_stiffness alone, at the tension you expect"
             self._refuse(f"{where}.{key}", "given", "one stiffness, which this export writes", fix)
             return "none"
@@ -386,6 +390,8 @@ class _Writer:
         added = lump.added_mass / (self.density * lump.volume) if self.density and lump.volume else 0.0
         if lump.added_mass and not added:
             self.notes.append("added_mass of a point without volume is left out: MoorDyn's goes with the volume")
+        if lump.volume and self._moved(place)[2] > -lump.height:
+            self.notes.append("MoorDyn lifts a point at the surface by its whole volume; hybrid only where it is wet")
         row = (*self._moved(place), lump.mass, lump.volume, lump.drag_area, added)
         self.points.append(f"{kind} {' '.join(map(_number, row))}")
         return str(len(self.points))
