@@ -198,7 +198,7 @@ def export(
             raise UsageError(f"{', '.join(unfit)}: of other exports; --moordyn writes the scene of a result")
         _deck(result, output or result.with_suffix(".txt"), keep, quiet, as_json)
         return
-    if "fmu" in (format, (output or Path()).suffix.removeprefix(".").lower()):
+    if (format or (output or Path()).suffix.removeprefix(".").lower()) == "fmu":
         given = {"--at": at, "--names": names, "--times": times, "--line": line}
         if unfit := [name for name, value in given.items() if value is not None]:
             raise UsageError(f"{', '.join(unfit)}: of a result, not of an FMU")

@@ -152,6 +152,16 @@ def test_what_moordyn_has_not_is_refused(change: dict[str, Any], where: str, say
     assert where in {c.where for c in refused.value.complaints} and says in str(refused.value)
 
 
+def test_contact_is_named() -> None:
+    (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
+    data = made.scene.model_dump(mode="json", exclude_none=True)
+    scenes = [hybrid.validate_scene(data | {"contact": {"self": x}}) for x in (True, False)]
+    assert [any("contact is left out" in x for x in deck_of(Straight(scene)).notes) for scene in scenes] == [
+        True,
+        False,
+    ]
+
+
 def test_lift_of_vortices_is_named() -> None:
     (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
     data = made.scene.model_dump(mode="json", exclude_none=True)
