@@ -455,6 +455,8 @@ def _points(out: Material, scene: LineScene) -> None:
     out.at = np.array(at)
     out.lift = np.zeros(len(at))
     out.points = {name: np.zeros(len(at)) for name in POINT}
+    if fluid is not None:  # of those at one place the one that displaces most has the height and the shape
+        everything.sort(key=lambda x: (x[1].volume_in(rho, gravity), x[1].height_in(rho, gravity), x[1].shape))
     for x, body in everything:
         i = np.searchsorted(out.at, x, "right") - 1
         out.points["point_mass"][i] += body.mass
@@ -470,7 +472,7 @@ def _points(out: Material, scene: LineScene) -> None:
         else:
             out.points["point_buoy"][i] += gravity * displaced
             height = body.height_in(rho, gravity) or 2.0 * np.sqrt(body.drag_area / np.pi) or SMALLEST_BODY
-            out.points["point_height"][i] = max(out.points["point_height"][i], height)
+            out.points["point_height"][i] = height
             out.points["point_upright"][i] = float(body.shape == "cylinder")
     floats = out.points["point_mass"] / np.maximum(out.points["point_displaced"], 1e-30)
     out.points["point_floats"] = np.clip(floats, LEAST_DRAUGHT, 1.0)

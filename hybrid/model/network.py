@@ -363,10 +363,7 @@ def _leave_own_bodies(network: Network, models: Sequence[Model]) -> NDArray[np.i
             towards = tuple((axes.T @ np.subtract(places[1 - end], places[end])).tolist())
             row = model.sea.values.obstacles[k]
             out = max(way_out(shape, point.place, towards, float(row[STRAND] + row[ONSET_OF])), LEAST_WAY * length)
-            if end:
-                carried[k, MEETS_TO] = length - out
-            else:
-                carried[k, MEETS_FROM] = out
+            carried[k, MEETS_TO if end else MEETS_FROM] = out
     if not network.shaped:
         return np.zeros(0, np.int64)
     return np.array([numbers.index(x) if x in network.shaped else -1 for x in surfaces], np.int64)

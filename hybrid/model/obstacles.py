@@ -262,7 +262,7 @@ def courses_of(scene: LineScene, rows: Floats, waves: Floats, ramp: float, eleva
     carried[:, STILL_SIDE : STILL_SIDE + 3] = rows[:, SIDE : SIDE + 3]
     motions: dict[int, Motion | DrivenEnd] = {}
     driven = {}
-    carried[:, MEETS_FROM], carried[:, MEETS_TO] = -np.inf, np.inf  # what comes off a reel at the start has s < 0
+    carried[:, MEETS_FROM], carried[:, MEETS_TO] = -np.inf, -np.inf
     for k, (name, x) in enumerate(scene.obstacles.items()):
         if isinstance(x, Carried):
             position[k], frame[k] = x.origin, np.array(x.body_axes).T.ravel()

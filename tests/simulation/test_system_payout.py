@@ -164,3 +164,61 @@ def test_loads_that_change_on_the_way(tmp_path: Path) -> None:
         found = hybrid.resume(path, until=8.0, settings=["environment.fluid.current=[0.1, 0.6, 0]"])
         pulls.append(np.linalg.norm(found.lines["cable"]["reaction_end"], axis=1))
     assert np.abs(pulls[0] - pulls[1]).max() < 0.02 * pulls[1].mean()
+
+
+# --- at a body, by either end of the line ---------------------------------------------------------
+
+
+def frame_goes_down(winch: str) -> dict[str, Any]:
+    """A frame with a winch lets itself down from the air into the water."""
+    section = {
+        "length": 10,
+        "mass": 10,
+        "diameter": 0.1,
+        "axial_stiffness": 1e6,
+        "drag": {"normal": 1.5, "tangential": 0.3},
+    }
+    ends = ("top", "frame") if winch == "end" else ("frame", "top")
+    law = {winch: {"payout": {"rate": 2.0, "ramp": 3}}}
+    return network_scene(
+        {"top": {"position": [0, 0, 12]}, "frame": {"body": "frame", "place": [0, 0, 0]}},
+        {"line": line_between(*ends, section, mesh=10, model="catenary", connections=law)},
+        bodies={"frame": {"initial_guess": [0, 0, 2], "mass": 100, "inertia": [50, 50, 50]}},
+        fluid={"density": 1025, "surface": 0}, time=(8, 0.02), output=(1, 11)
+    )  # fmt: skip
+
+
+def test_a_winch_that_goes_down_is_in_the_water_at_either_end() -> None:
+    """At the end of the line its water was that of where it was at t = 0."""
+    one, other = (hybrid.run(frame_goes_down(x)).lines["line"] for x in ("end", "start"))
+    np.testing.assert_allclose(one["reaction_end"], other["reaction_start"], rtol=1e-9, atol=1e-6)
+    assert one["reaction_end"][-1, 2] == pytest.approx(-981.0, rel=5e-3)
+
+
+def over_a_ball(winch: str) -> dict[str, Any]:
+    """A line from a winch at the top of a ball that hangs in springs, to a point beside it."""
+    section = {"length": 6.4, "mass": 2.0, "diameter": 0.05, "axial_stiffness": 1e5, "bending_stiffness": 2.0,
+               "torsional_stiffness": 2.0, "damping": {"mass": 3.0}}  # fmt: skip
+    ends = ("far", "top") if winch == "end" else ("top", "far")
+    law = {winch: {"payout": {"rate": 0.5, "ramp": 1, "until": 2.6}}}
+    held = {"initial_guess": [0, 0, 0], "mass": 2e4, "inertia": [4e4] * 3, "damping": [1e4] * 6}
+    held |= {"hydrostatics": {"heave": 1e6, "roll": 1e6, "pitch": 1e6}, "shape": {"kind": "sphere", "radius": 2.0}}
+    points: dict[str, Any] = {"top": {"body": "ball", "place": [0, 0, 2.03]}, "far": {"position": [-6, 0, 2.2]}}
+    lines = {"line": line_between(*ends, section, mesh=64, model="rod", connections=law, contact={"self": False})}
+    for name, x, y in (("a", 1, 0), ("b", -1, 1), ("c", -1, -1)):
+        points |= {name: {"body": "ball", "place": [2.5 * x, y, 0]}, f"far_{name}": {"position": [30 * x, 10 * y, 0]}}
+        stay = {"length": 0.999 * np.hypot(27.5, 9 * y), "mass": 0.5, "diameter": 0.01, "axial_stiffness": 1e6}
+        lines[name] = line_between(f"far_{name}", name, stay, model="catenary", mesh=4)
+    return network_scene(
+        points, lines, bodies={"ball": held}, fluid={"density": 1.2}, contact={"between": []}, time=(8, 0.02),
+        output=(8, 31)
+    )  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("winch", ["end", "start"])
+def test_what_is_paid_out_at_a_body_lies_on_it(winch: str) -> None:
+    """It passed through the body, as what is within the way out of it."""
+    found = hybrid.run(over_a_ball(winch))
+    apart = np.linalg.norm(found.lines["line"].position[-1] - found["bodies/ball/position"][-1], axis=1)
+    assert apart.min() > 2.0

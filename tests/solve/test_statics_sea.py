@@ -126,3 +126,21 @@ def test_refused_with_the_reason():
     data["ends"] = {"start": pinned_at(0, 0, 0), "end": pinned_at(0.4 * length, 0, 0.3 * length)}
     with pytest.raises(hybrid.ComputationError, match="longer than from end to end along the seabed and straight up"):
         hybrid.static(hybrid.validate_scene(data))
+
+
+@pytest.mark.parametrize(
+    "others", [[{"kind": "clump", "at": 30, "mass": 50, "volume": 0.006}], [{"kind": "swivel", "at": 30}]]
+)
+def test_what_displaces_most_at_a_place_says_how_it_floats(others):
+    """In either order: the last of them had its own height and shape for all."""
+    spar = {"kind": "float", "at": 30, "volume": 1.0, "mass": 200, "height": 3.0, "shape": "cylinder"}
+    section = {"length": 60, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6}
+    mass, volume = (spar[x] + sum(y.get(x, 0.0) for y in others) for x in ("mass", "volume"))
+    heights = []
+    for items in ([spar, *others], [*others, spar], [spar | {"mass": mass, "volume": volume}]):
+        cable = {"sections": [section], "attachments": items}
+        made = {"cable": cable, "ends": {"start": pinned_at(0, 0, -15), "end": pinned_at(40, 0, -15)}, "model": "catenary",
+                "environment": {"fluid": {"density": 1025, "surface": 0}}, "initial": "equilibrium", "mesh": {"cells": 20}}  # fmt: skip
+        found = hybrid.static(made)
+        heights.append(found.position[-1, found.s.searchsorted(30), 2])
+    assert heights == pytest.approx([heights[2]] * 3, abs=1e-9)

@@ -118,11 +118,11 @@ def place_ends(l, job, network, given):
                     gaps[l, k, i] = place[i] - job.old.r[node, i] - job.work.u[node, i]
             if turns(seats, l, k):
                 place_frame(job.ends, k, seats[l, k], new[b])
-        if k == START and joint >= 0:
+        if joint >= 0:
             for i in range(3):
-                job.ends.position[0, i] = job.old.r[0, i]
+                job.ends.position[k, i] = job.old.r[node, i]
                 if not given:  # as it is, -u is what it has still to go, too small to be added to a place
-                    job.ends.position[0, i] += job.work.u[0, i] + gaps[l, k, i]
+                    job.ends.position[k, i] += job.work.u[node, i] + gaps[l, k, i]
 
 
 @inner

@@ -270,7 +270,8 @@ def half_cell(line, sea, k, c, x, p, pd, e, v, cv):
 def meets(line, sea, moves, k, c):
     """Whether cell c meets obstacle k: of a body that the line is fixed to only what is beyond the way out of it."""
     if moves:
-        return line.s[c] >= sea.carried[k, MEETS_FROM] and line.s[c + 1] <= sea.carried[k, MEETS_TO]
+        from_start, from_end = line.s[c] - line.s[0], line.s[line.h.shape[0]] - line.s[c + 1]
+        return from_start >= sea.carried[k, MEETS_FROM] and from_end >= sea.carried[k, MEETS_TO]
     return True
 
 
@@ -554,7 +555,7 @@ def bend_radii(rows: Floats) -> Floats:
 def cells_met(carried: Floats, s: Floats) -> Floats:
     """Whether (M, N) cells between nodes s (N+1,) m meet obstacles that move (carried: as of `Sea`), 1.0 or 0.0."""
     near, far = carried[:, MEETS_FROM, None], carried[:, MEETS_TO, None]
-    return np.asarray((s[:-1] >= near) & (s[1:] <= far), float)
+    return np.asarray((s[:-1] - s[0] >= near) & (s[-1] - s[1:] >= far), float)
 
 
 def thinner_cells(rows: Floats, s: Floats) -> Floats:

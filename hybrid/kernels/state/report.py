@@ -90,8 +90,8 @@ ROLLED_BEFORE = 37  # angle at the begin of the step, rad
 ROLLED = 38  # and at its end, rad
 ROLLING = 39  # its rate, 1/s
 # Of a line that is fixed to the body which carries an obstacle, and of what a body carries.
-MEETS_FROM = 40  # arc length from which it meets that, m
-MEETS_TO = 41  # and up to which, m
+MEETS_FROM = 40  # how far from its start it meets that, m
+MEETS_TO = 41  # and up to how far from its end, m
 OFFSET = 42  # 3, its place in axes of the body, as the axis at t = 0 and what is across are
 RIDES = 45  # 1.0: a body carries it
 STILL_SIDE = 46
