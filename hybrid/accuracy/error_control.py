@@ -21,7 +21,7 @@ from hybrid.accuracy.line_errors import LineErrors
 from hybrid.accuracy.model_choice import goes_by_cells, with_model_errors
 from hybrid.accuracy.refinement import COSTLY_ACCURACY, NOT_KEPT, costly, is_no_better, not_kept_text
 from hybrid.accuracy.run_forecast import Budget
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.model.network import NetworkResolution
 from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import LineScene
@@ -160,7 +160,7 @@ class ErrorController:
             self._judge(result, judged, stricter=False)
         return None
 
-    def _lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
+    def _lacks_errors(self, error: ComputationError | SceneError, what: str = "coarser run to compare with") -> None:
         for line in self.lines.values():
             line.lacks_errors(error, what)
 
@@ -297,7 +297,7 @@ class ErrorController:
             for k, run in zip(which, runs, strict=True):
                 try:
                     found[k] = self._counted(run())
-                except ComputationError as error:
+                except (ComputationError, SceneError) as error:  # a scene may have too few of its cells
                     if not k:
                         self._lacks_errors(error)
                         return

@@ -28,7 +28,7 @@ from hybrid.accuracy.error_statistics import (
     statistics_of,
 )
 from hybrid.accuracy.refinement import MOST_OF_MODEL, RAW, Free, Judged, Verdict, missed, not_converged, refined
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.model.plan import NAMED, WORDS, ModelChoice, output_times
 from hybrid.model.resolution import (
     IRREGULAR_REFINEMENTS,
@@ -170,10 +170,13 @@ class LineErrors:
         self._judged += 1
         self.own_notes.pop()
 
-    def lacks_errors(self, error: ComputationError, what: str = "coarser run to compare with") -> None:
+    def lacks_errors(self, error: ComputationError | SceneError, what: str = "coarser run to compare with") -> None:
         """Note that errors are not known, as such a run has failed."""
-        self._failed = "at rest" if error.t is None else "in motion"
-        text = f"error not known: a {what} failed: {str(error).splitlines()[0]}"
+        self._failed = "at rest" if getattr(error, "t", None) is None else "in motion"
+        why = str(error).splitlines()[0]
+        if isinstance(error, SceneError):
+            why = f"expected {error.complaints[0].expected}"
+        text = f"error not known: a {what} failed: {why}"
         self.own_notes.append(("no error figure", text))
 
     @property

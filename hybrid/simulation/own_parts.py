@@ -161,6 +161,8 @@ class RunView:
         """
         self._check()
         loop = self._run.loop
+        if not longest > 0.0:
+            raise ValueError(f"longest: expected a time above 0, in s, found {longest!r:.60}")
         if not loop.controlled:
             raise ValueError("steps have a fixed length: give time.step an accuracy, and they follow the motion")
         loop.clock.next_dt = min(loop.clock.next_dt, max(float(longest), loop.clock.shortest))

@@ -151,7 +151,7 @@ class Run(RecordedRun):
                 for stop in self.stops(t):
                     self.go_to(stop)
                 for part in self.parts:
-                    if t in part.phases:
+                    while t in part.phases:
                         part.begin_phase(t)
                 self.keep()
             for stop in self.stops():

@@ -10,7 +10,7 @@ that passed through.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -24,7 +24,7 @@ from hybrid.kernels.run.network_run import CUT_LINE, SLACK_LINE, TURNED_LINE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FORCE_A
-from hybrid.kernels.state.state import NO_TURN, Floats, State
+from hybrid.kernels.state.state import NO_TURN, Floats, State, Work
 from hybrid.kernels.step.accept import MANY, TINY
 from hybrid.model.build import Model
 from hybrid.model.nearby import Weakness, after_failure, weaknesses
@@ -206,13 +206,14 @@ class Failures(Part):
     def after_step(self) -> None:
         """Break what is to break now; the run goes on from there."""
         found, near = False, SAME_TIME * self._run.resolution.one.step
+        work = self._run.solver.work  # of the step: what breaks gets another solver, which has no forces yet
         for k, x in enumerate(self.all):
             if k in self.broken:
                 continue
             if x.time <= self._run.t + near:
                 self._break(k, f"at t = {self._run.t:.6g} s (break_at.time)")
                 found = True
-            elif np.isfinite(x.tension) and (force := self._force(x)) > x.tension:
+            elif np.isfinite(x.tension) and (force := self._force(x, work)) > x.tension:
                 limit = f"above break_at.tension, {x.tension:g} N"
                 why = f"after the first step in which its force, {force:.6g} N, is {limit}"
                 self._break(k, why)
@@ -231,10 +232,10 @@ class Failures(Part):
         self._run.restart_steps()
         self._run.renew_other()
 
-    def _force(self, x: Weakness) -> float:
-        """Force of the ends on their point, N."""
+    def _force(self, x: Weakness, work: Sequence[Work]) -> float:
+        """Force of the ends that are left on their point, N."""
         ends = [at for at in x.ends if at not in self._run.model.loose]
-        reports = [(self._run.solver.work[line].report, FORCE_A + 3 * k) for line, k in ends]
+        reports = [(work[line].report, FORCE_A + 3 * k) for line, k in ends]
         return float(np.linalg.norm(sum((r[f : f + 3] for r, f in reports), np.zeros(3))))
 
     def checkpoint(self) -> dict[str, Any]:

@@ -97,7 +97,6 @@ class Rows:
     def contents(self, parts: Mapping[str, ArrayContents] | None = None) -> ArrayContents:
         """All of it that is not written; the rows of its tables wait no more.  parts: results of lines by name."""
         data = dict(self._fixed)
-        self._events.sort()  # outputs are looked at together, and tell of what happened later than steps do
         for table in self._all:
             for (name, column), field in zip(table.columns().items(), table.fields, strict=True):
                 dims = (name,) if name == table.scale else (table.scale, *field.dims)
@@ -329,13 +328,6 @@ class Table:
                 yield tuple(self._file[name][a : min(a + some, self.count)] for name in names)
         for block in self._blocks:
             yield tuple(block[k] for k in columns)
-
-    def sort(self) -> None:
-        """Put the rows that wait in the order of the first dataset."""
-        if self.waiting > 1:
-            columns = list(self.columns().values())
-            order = np.argsort(columns[0], kind="stable")
-            self._blocks = [[x[order] for x in columns]]
 
     def drop(self) -> None:
         """Forget the rows that wait."""

@@ -295,6 +295,13 @@ def test_steps_that_follow_the_motion_are_no_longer_than_a_part_says() -> None:
     assert np.diff(result["steps/t"])[2:].max() < 0.0101
 
 
+@pytest.mark.parametrize("longest", [float("nan"), 0.0, -1.0])
+def test_a_longest_step_that_is_none_is_refused(longest: float) -> None:
+    scene = hanging({"rate": 0.0}, time={"duration": 0.5, "tolerance": 1e-2})
+    with pytest.raises(ValueError, match="longest: expected a time above 0, in s, found"):
+        hybrid.run(scene, parts=[Asking("limit_step", longest)])
+
+
 class Last(hybrid.RunPart):
     """Says how the run ended."""
 

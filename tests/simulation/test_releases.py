@@ -12,7 +12,7 @@ from bits import differences
 import hybrid
 from hybrid.errors import SceneError
 from tests.problems import tables_with
-from tests.scenes import cable_scene, clamped_at, line_between, pinned_at
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene, pinned_at
 
 SECTION = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
 CLAMP = {"kind": "clamped", "position": [8, 0, 0], "tangent": [1, 0, 0]}
@@ -382,3 +382,19 @@ def test_a_point_is_where_it_was_after_a_line_has_left_it() -> None:
         sim.advance(0.4)
         assert np.abs(sim.line("v").position[-1]).max() > 0.1
         assert not np.concatenate(sim.point("A")[:2]).any()
+
+
+@pytest.mark.parametrize("order", ["ab", "ba"])
+def test_lines_that_bear_too_much_after_one_step_break_after_it(order: str) -> None:
+    """A weight on two like ropes and a slack one: the first named broke alone, and swung the weight to its other side."""
+    rope = SECTION | {"length": 50.2, "mass": 2.0, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
+    lines = {x: line_between(x, "m", rope, mesh=10, model="rod", break_at={"tension": 4000}) for x in order}
+    pull = {"history": [[0, 0, 0, 0], [1, 0, 0, -8000]]}
+    found = hybrid.run(network_scene(
+        {"a": {"position": [-30, 0, 0]}, "b": {"position": [30, 0, 0]}, "c": {"position": [0, 0, 5]},
+         "m": {"kind": "free", "initial_guess": [0, 0, -40], "mass": 200, "force": pull}},
+        lines | {"c": line_between("c", "m", rope | {"length": 80.0}, mesh=10, model="rod")},
+        contact={"between": []}, time=(0.6, 0.02), output=(0.1, 11)
+    ))  # fmt: skip
+    (when,) = {x.t for x in found.events if x.kind == "end released"}
+    assert 0.3 < when < 0.6 and np.abs(found.lines["c"].position[-1, -1, 0]) < 1e-9

@@ -38,7 +38,7 @@ from hybrid.view.panels import page_of
 from hybrid.view.report import card
 from hybrid.view.summary import facts_of
 from tests.inside import calls_of
-from tests.scenes import line_between, network_scene
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"
 
@@ -529,3 +529,14 @@ def test_what_is_beyond_is_not_computed_and_said(tmp_path: Path, monkeypatch: py
         assert result.attributes["effort_runs"] == 4 and result.done
         assert "refined no further" in missed and "which this run meets" in missed
     assert differences(tmp_path / "run.h5", tmp_path / "free.h5") != []
+
+
+def test_a_scene_with_too_few_cells_for_coarser_runs_keeps_its_result() -> None:
+    """What is refused of a run to compare with was said of the scene, and the result lost."""
+    section = {"length": 40, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0}
+    payout = {"rate": 1.0, "ramp": 0.5, "until": 0.6}
+    scene = cable_scene(section, pinned_at(-25, 0, -20), pinned_at(0, 0, 0, payout=payout), fluid={"density": 1025},
+                        initial="equilibrium", model="rod", mesh=6, time=(1, 0.05))  # fmt: skip
+    found = hybrid.run(scene | {"output": {"errors": True}})
+    (text,) = [x.text for x in found.events if x.kind == "no error figure"]
+    assert found.status == "complete" and "a coarser run to compare with failed: expected 4 cells" in text

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from bits import Stopping, differences
+from bits import Stopping, differences, resumed
 
 import hybrid
 import hybrid.simulation.run_record
@@ -23,7 +23,9 @@ from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.integrity import pack, unpack
 from hybrid.zones import change as zone_changes
+from tests.combinations.pairs import END, scene_of
 from tests.inside import calls_of
+from tests.problems import tables_with
 from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -466,3 +468,25 @@ def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
     with hybrid.resume(tmp_path / "short.h5", until=30.0) as more:
         assert np.array_equal(more.position, whole.position)
         assert not any(e.kind in ("shrink", "merge") for e in more.events)
+
+
+def test_events_before_the_old_end_are_kept_and_those_of_the_end_go(tmp_path):
+    """What is noted at an end of what was before was written in front of it, and kept in its place."""
+    payout = {"rate": 3.0, "ramp": 0.1, "longest": 14.0}
+    changes = {f"{END}.payout": payout, "output.every": 0.125, "time.step": 0.03125}
+    resumed(tables_with(scene_of("payout", "clump"), changes), tmp_path, 0.25)
+
+
+def test_of_two_changes_at_one_time_both_hold(tmp_path):
+    """The second was dropped, and began where the file was made longer."""
+    section = {"length": 40, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "drag": {"normal": 1.2}}
+    scene = cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(30, 0, -5), fluid={"density": 1025}, initial="equilibrium", mesh=12,
+        time=(0.5, 0.05), output=(0.25, 9)
+    )  # fmt: skip
+    first, second = (f"environment.fluid.current=[0, {x}, 0]" for x in (1, -1))
+    hybrid.run(scene, tmp_path / "a.h5").close()
+    hybrid.resume(tmp_path / "a.h5", tmp_path / "b.h5", until=1, settings=[first], start=0.5).close()
+    both = hybrid.resume(tmp_path / "b.h5", tmp_path / "c.h5", settings=[second], start=0.5)
+    alone = hybrid.resume(tmp_path / "a.h5", tmp_path / "d.h5", until=1, settings=[second], start=0.5)
+    np.testing.assert_allclose(both.position, alone.position, atol=1e-9)
