@@ -122,6 +122,20 @@ def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
     assert drawn[k] == pytest.approx(mu * total, rel=3e-2) and way[k] == pytest.approx(travel, rel=0.3)
 
 
+def test_travel_of_friction_in_suction_is_the_same_in_a_plane_and_in_space() -> None:
+    """Whatever resists beside the line: a node that soil holds from below lies in it."""
+    surge = [{"amplitude": 2e-3, "period": 3.1}, {"amplitude": 3e-4, "period": 0.9}]
+    heave = [HEAVE[0], {"amplitude": 0.01, "period": 1.0}]  # up through suction, and in again before it breaks away
+    found = []
+    for dimension, lateral in ((2, {}), (3, {}), (2, {"lateral": {}}), (3, {"lateral": {}})):
+        bed = {"soil": SOIL | lateral, "friction": {"axial": 0.3, "lateral": 0.5, "travel": 1e-3}}
+        found.append(hybrid.run(pressed(bed, 12.0, 0.02, {"heave": heave, "surge": surge}, dimension=dimension)))
+    pull = [x["reaction_start"][:, 0] for x in found]
+    assert np.ptp(pull[0][300:]) > 100.0
+    for each in pull[1:]:
+        np.testing.assert_allclose(each, pull[0], atol=1e-3 * np.ptp(pull[0]))
+
+
 @pytest.mark.long
 def test_soil_beside_a_line_resists_and_breaks_out() -> None:
     """A rod that is pressed in and then moved to the side: friction on its force, and API's clay on its depth."""

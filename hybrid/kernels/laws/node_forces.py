@@ -196,7 +196,7 @@ def soil_forces(line, sea, i, x, u, past, report):
         return False, Z3, Z9
     F, slope, D = scale(N, n), scale(DN, n), Z9
     report[CONTACT_FORCE] += N
-    if along > 0.0 or across > 0.0:
+    if line.bits & FRICTION:  # in suction, too, the travel is that of what lies in the soil
         q = bed_travel(sea, i, n, u)
         f, _, D, part = friction(q, 1.0, get3(sea.axis, i), n, along, across, sea.slip_length)
         more, _, _, _ = friction(q, 1.0, get3(sea.axis, i), n, more_along, more_across, sea.slip_length)
@@ -448,7 +448,7 @@ def soil2(line, sea, i, u, n, p, past, report):
     N, DN, along, _, more_along, _ = soil_force(line, sea, past, i, p)
     F, slope, D, q = (N * n[0], N * n[1]), (DN * n[0], DN * n[1]), Z4, Z2
     report[CONTACT_FORCE] += N
-    if along > 0.0:
+    if line.bits & FRICTION and (N != 0.0 or DN != 0.0):
         q = bed_travel2(plane, sea, i, n, u)
         f, g, D, kept = friction2(q, along, row_in_plane(plane, sea.axis, i), 1.0, sea.slip_length)
         F, slope = (F[0] + f[0], F[1] + f[1]), (slope[0] + more_along * g[0], slope[1] + more_along * g[1])
