@@ -82,6 +82,7 @@ class Rows:
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
         self._happened: Counter[str] = Counter()  # events by kind
+        self.checked = 0  # rows of events that the last checkpoint keeps
         self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow, that are not written yet
         self.closed = False
 
@@ -97,6 +98,7 @@ class Rows:
     def contents(self, parts: Mapping[str, ArrayContents] | None = None) -> ArrayContents:
         """All of it that is not written; the rows of its tables wait no more.  parts: results of lines by name."""
         data = dict(self._fixed)
+        self.sort_events()
         for table in self._all:
             for (name, column), field in zip(table.columns().items(), table.fields, strict=True):
                 dims = (name,) if name == table.scale else (table.scale, *field.dims)
@@ -105,6 +107,10 @@ class Rows:
             table.drop()
         self._replaced.clear()
         return ArrayContents(data, [x for x in self._tables if x != "/"], self._attributes, self._texts, parts)
+
+    def sort_events(self) -> None:
+        """Put events that wait in the order of their times: outputs are looked at together, and tell later than steps."""
+        self._events.sort(self.checked)
 
     def close(self, status: str = "complete", message: str = "") -> None:
         """End the result with a status of STATUS and a message; a second call does nothing."""
@@ -328,6 +334,16 @@ class Table:
                 yield tuple(self._file[name][a : min(a + some, self.count)] for name in names)
         for block in self._blocks:
             yield tuple(block[k] for k in columns)
+
+    def sort(self, first: int) -> None:
+        """Put the rows that wait in the order of the first dataset.
+
+        Up to so many of all, and behind them the others: a file is cut there where a run goes on.
+        """
+        if self.waiting > 1:
+            columns = list(self.columns().values())
+            order = np.lexsort((columns[0], np.arange(self.waiting) >= first - self.count))
+            self._blocks = [[x[order] for x in columns]]
 
     def drop(self) -> None:
         """Forget the rows that wait."""

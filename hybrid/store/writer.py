@@ -414,6 +414,8 @@ class Recorder(Rows):
             self._checkpoints.clear()
         every = self._every()
         rows = {name: {x.scale: x.count + x.waiting for x in each._all if x.fields} for name, each in every.items()}
+        for each in every.values():
+            each.checked = each._events.count + each._events.waiting
         happened = of_all({name: each._happened for name, each in every.items()})
         here = {"number": self._number, "t": self.last, "files": self.files, "rows": of_all(rows)}
         tree = {**here, "happened": happened, "zones": self._zones or [], **content()}
@@ -449,6 +451,8 @@ class Recorder(Rows):
 
     def _write(self) -> None:
         every = {name: each for name, each in (*self._parts.items(), ("", self))}
+        for each in every.values():
+            each.sort_events()
         waiting = [table for each in every.values() for table in reversed(each._all) if table.waiting]
         for together in in_turn(waiting):
             for table in together:

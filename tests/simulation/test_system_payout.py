@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from test_payout import clamped, sagging
 from test_payout_zones import touching
 
@@ -193,6 +194,27 @@ def test_a_winch_that_goes_down_is_in_the_water_at_either_end() -> None:
     one, other = (hybrid.run(frame_goes_down(x)).lines["line"] for x in ("end", "start"))
     np.testing.assert_allclose(one["reaction_end"], other["reaction_start"], rtol=1e-9, atol=1e-6)
     assert one["reaction_end"][-1, 2] == pytest.approx(-981.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("winch", ["end", "start"])
+def test_a_run_with_winches_on_a_body_goes_on_to_the_bit(winch: str, tmp_path: Path) -> None:
+    """Works and events, too; forces of nodes that ride are taken back to the last bit."""
+    section = {"length": 66, "mass": 8, "diameter": 0.08, "axial_stiffness": 2e6, "bending_stiffness": 400,
+               "drag": {"normal": 1.2, "tangential": 0.3}}  # fmt: skip
+    points, lines = dict[str, Any](), {}
+    for k, way in enumerate(([1.0, 0.0], [-0.5, 0.866], [-0.5, -0.866])):
+        points |= {f"a{k}": {"position": [60 * way[0], 60 * way[1], -39]}}
+        points |= {f"f{k}": {"body": "spar", "place": [3 * way[0], 3 * way[1], -4]}}
+        ends = (f"a{k}", f"f{k}") if winch == "end" else (f"f{k}", f"a{k}")
+        law = {winch: {"payout": {"rate": 2.0 * k, "ramp": 0.5, "longest": 90}}}
+        lines[f"l{k}"] = line_between(*ends, section, mesh=30, model="rod", connections=law)
+    spar = {"initial_guess": [0, 0, 0], "mass": 4e4, "inertia": [1e6, 1e6, 3e5], "damping": [2e3] * 3 + [1e5] * 3}
+    spar |= {"hydrostatics": {"heave": 8e4, "roll": 6e5, "pitch": 6e5}, "added_mass": [3e4] * 3 + [1e6] * 3}
+    scene = network_scene(
+        points, lines, bodies={"spar": spar}, fluid={"density": 1025, "surface": 0, "current": [0.6, 0.1, 0]},
+        seabed={"z": -40, "stiffness": 2e4}, contact={"between": []}, time=(1.0, 0.05), output=(0.25, 7)
+    )  # fmt: skip
+    resumed(scene, tmp_path, 0.5)
 
 
 def over_a_ball(winch: str) -> dict[str, Any]:

@@ -285,7 +285,10 @@ def remove_flow(line, reel):
 
 @inner
 def remove_riding(line, reel):
-    """The forces on the line without those by which nodes that ride have more; the line without the flow of damping."""
+    """The line as it was before forces of nodes that ride and the flow of damping.
+
+    To the last bit: what a step books goes by differences of these forces.
+    """
     if reel.stage.riding_on > 0.0:
         if reel.flow.shape[0] > 0:
             remove_flow(line, reel)
@@ -293,7 +296,7 @@ def remove_riding(line, reel):
         for k in range(reel.layer.shape[0]):
             i = node(line, reel, first + k)
             for j in range(3):
-                line.force[i, j] -= reel.riding[k, j]
+                line.force[i, j] = reel.riding[k, 3 + j]
         reel.stage.riding_on = 0.0
 
 

@@ -183,6 +183,7 @@ def put_riding_on(line, sea, ends, state, reel, t):
     for k in range(rides + 1):
         i = node(line, reel, first + k)
         for j in range(3):
+            reel.riding[k, 3 + j] = line.force[i, j]
             line.force[i, j] += reel.riding[k, j]
     if reel.flow.shape[0] > 0:
         put_flow_on(line, ends, state, reel, t)
@@ -224,7 +225,10 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
     What the end does of power by the difference is kept in the numbers of the reel, to be taken back.  Returns the
     pull of the line there, N.
     """
-    numbers = reel.numbers
+    numbers, k = reel.numbers, end_of(reel)
+    if is_joined(ends, reel):  # where the state has it, and not the last iterate
+        for j in range(3):
+            ends.position[k, j] = state.r[k * line.h.shape[0], j]
     more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
     more = sub(more, sum_of_balance(reel, t))
     there = (0.0, 0.0, 0.0) if is_joined(ends, reel) else more  # where the report does not have it already
@@ -234,7 +238,7 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
         report[NET_A - FORCE_A + at + j] += there[j]
     report[LENGTH_OUT], report[PAYOUT_RATE] = numbers.length, numbers.rate
     report[PAYOUT_POWER] = numbers.rate * dot(force, slope)
-    numbers.flux = dot(more, get3(velocity, end_of(reel)))
+    numbers.flux = dot(more, get3(velocity, k))
     for i in range(growing(line, reel) + 1, line.h.shape[0]):
         more, _ = of_material(line, sea, ends, state, reel, i)
         numbers.flux += dot(more, get3(state.v, node(line, reel, i)))

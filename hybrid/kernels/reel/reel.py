@@ -278,8 +278,8 @@ class Reel(NamedTuple):
     report: Floats  # (REPORT_SIZE,) this and the next: work arrays
     made: Floats  # (2, COLUMNS)
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
-    # (m+1, 3) N, by which the forces on them are more because they do not move as the material does; on the fairlead 0
-    # where it is held
+    # (m+1, 6) N, by which the forces on them are more because they do not move as the material does, on the fairlead 0
+    # where it is held; and the forces without
     riding: Floats
     # 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found; where the last
     # assembly since the last step had `flow` in it; of a winch of a joined line what is above
@@ -306,7 +306,7 @@ def blank_reel(
     """
     z, n = np.zeros, cells + 1
     lengths = z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((n, 10))
-    riding = layer, z((layer.size, 3)), ReelStage(), z((n, 3)), z((n, 3)), winch
+    riding = layer, z((layer.size, 6)), ReelStage(), z((n, 3)), z((n, 3)), winch
     flow = z((n if damped else 0, FLOWS)), z((3, n, 5) if columns else (3, 0, 5))
     reports = z(3), z(REPORT_SIZE), z((2, COLUMNS))
     volumes = z((n + 1 if slips else 0, 1 + 4 * slips))
