@@ -109,7 +109,7 @@ class Rows:
         return ArrayContents(data, [x for x in self._tables if x != "/"], self._attributes, self._texts, parts)
 
     def sort_events(self) -> None:
-        """Put events that wait in the order of their times: outputs are looked at together, and tell later than steps."""
+        """Put events that wait in the order of their times: outputs tell later than steps do."""
         self._events.sort(self.checked)
 
     def close(self, status: str = "complete", message: str = "") -> None:
