@@ -37,6 +37,18 @@ def clamped_at(position: Sequence[float], tangent: Sequence[float], **more: Any)
     return {"kind": "clamped", "position": position, "tangent": tangent, **more}
 
 
+def span(**tables: Any) -> Tables:
+    """A catenary of 100 m over 80 m, of 10 cells, at rest; tables as in `in_tables`."""
+    section = {"length": 100, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6}
+    given = {"model": "catenary", "mesh": 10} | tables
+    return cable_scene(section, pinned_at(0, 0, 0), pinned_at(80, 0, 0), **given)
+
+
+def pulled(name: str, largest: float) -> Tables:
+    """Outputs with a limit of the horizontal force at the end, N, by a name."""
+    return {"quantities": {name: {"kind": "horizontal_force", "end": "end", "largest": largest}}}
+
+
 def cable_scene(
     sections: Tables | list[Tables],
     start: Tables | str,

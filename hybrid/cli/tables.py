@@ -138,7 +138,10 @@ def _is_anchor(result: Result, end: str) -> bool:
     if f"reaction_{end}" not in result or not result[f"reaction_{end}"][-1].any():
         return False
     *normal, offset = result["seabed"].tolist()
-    place = result.position[-1, 0 if end == "start" else -1]
+    zones, k = result.zones[-1], 0 if end == "start" else -1
+    if abs(result.s[k] - (zones[0].s_a if end == "start" else zones[-1].s_b)) > LEVEL * (zones[-1].s_b - zones[0].s_a):
+        return False  # output.points leave that end out
+    place = result.position[-1, k]
     if "seabed_height" in result:
         from hybrid.view.projections import bed_heights
 
@@ -212,6 +215,8 @@ def verdict_text(found: Mapping[str, Any]) -> str:
 
 def errors_table(errors: dict[str, Any], result: Result) -> Any:
     """The same for people: by cause, beside what was asked."""
+    from hybrid.view.summary import length_of
+
     forces = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
     most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in forces), default=0.0)
     kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
@@ -219,7 +224,7 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
     of, unknown = "extremes_" if extremes else "", not_converged_in(result.attributes)
     not_known = [*[""] * (len(kinds) - 1), "not known", "not converged"]
     rows: list[tuple[str, ...]] = [("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "")]
-    for what, unit, whole in (("position", "m", float(result.s[-1])), ("end_force", "N", most)):
+    for what, unit, whole in (("position", "m", length_of(result)), ("end_force", "N", most)):
         if what in unknown:
             rows.append(("position" if what == "position" else "end force", *not_known))
             continue

@@ -155,7 +155,7 @@ class Document:
         if not name.endswith((".yaml", ".yml")):
             name += ".yaml"
         plain = Path(name).name == name and not name.startswith(".") and not set(name) & set('\\/:*?"<>|\0')
-        if not plain or not name.isprintable() or len(name) > 200:
+        if not plain or not name.isprintable() or len(name.encode()) > 200:
             raise Refused(f"{name!r} is no name of a file in {self.folder}: take letters, digits, - and _")
         return self.folder / name
 
@@ -197,7 +197,9 @@ def _pieces(old: Sequence[str], a: Sequence[str], b: Sequence[str]) -> Iterator[
         parts = []
         for changes, new in zip(edits, (a, b), strict=True):
             shift = sum((d - c) - (y - x) for x, y, c, d in changes if y <= low and (x, y) != (low, low))
-            grown = sum((d - c) - (y - x) for x, y, c, d in changes if low <= x and y <= high and (y > low or x == low))
+            grown = sum(
+                (d - c) - (y - x) for x, y, c, d in changes if low <= x and y <= high and (x < high or low == high)
+            )
             parts.append(list(new[low + shift : high + shift + grown]))
         yield low, high, parts[0], parts[1]
 

@@ -440,6 +440,7 @@ class Playback:
         self.problem = ""
         self._cost, self._last = 0.0, -1e9
         self._stamp: Stamp | None = None
+        self._made: Any = None  # by which its run is told from another one
 
     @property
     def due(self) -> bool:
@@ -473,8 +474,10 @@ class Playback:
     def _read(self) -> int:
         with open_result(self.path) as result:
             outputs = min(len(next(x for _, x in result.each_line()).times), len(result.times))
-            if outputs < self._next:  # another run has begun
+            made = result.attributes.get("created"), result.scene_text
+            if outputs < self._next or made != self._made:  # another run
                 self.frames, self.stride, self._next = [], 1, 0
+            self._made = made
             before = len(self.frames)
             self.text, self.status = result.scene_text, result.status_text
             if outputs == self._next and self.head:

@@ -43,6 +43,7 @@ class Process:
         self._child: asyncio.subprocess.Process | None = None
         self.compiling = False
         self.ready = asyncio.Event()
+        self._asked = asyncio.Lock()  # one answer is read at a time
 
     async def start(self) -> None:
         """Start it, unless it was; it is asked at once, and answers when it is ready."""
@@ -58,10 +59,16 @@ class Process:
         child = self._child
         if child is None or child.stdin is None or child.stdout is None:
             return None
+        async with self._asked:
+            return await self._answer(child.stdin, child.stdout, asked)
+
+    async def _answer(
+        self, to: asyncio.StreamWriter, answers: asyncio.StreamReader, asked: dict[str, Any]
+    ) -> bytes | None:
         try:
-            child.stdin.write(json.dumps(asked).encode() + b"\n")
-            await child.stdin.drain()
-            while line := await child.stdout.readline():
+            to.write(json.dumps(asked).encode() + b"\n")
+            await to.drain()
+            while line := await answers.readline():
                 what, _, content = line.partition(b"\t")
                 if what.decode() == asked["do"]:
                     self.compiling = False
@@ -120,8 +127,12 @@ class Workers:
 
     async def ask_spare(self, asked: dict[str, Any]) -> bytes | None:
         """The answer of the process that computes no pictures."""
-        await self._spare.start()
-        return await self._spare.ask(asked)
+        spare = self._spare
+        await spare.start()
+        found = await spare.ask(asked)
+        if found is None and spare is self._spare:  # it has ended
+            self._spare = Process()
+        return found
 
     async def _replace(self) -> None:
         """End the process at work, take the other, and start a new one beside it."""

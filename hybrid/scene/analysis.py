@@ -235,7 +235,7 @@ class ZonesModel(Table):
 
 def _are_stretches(value: Any) -> Any:
     if isinstance(value, list | tuple) and value and all(isinstance(unwrap(x), int | float) for x in value):
-        pair = ", ".join(f"{unwrap(x):g}" for x in value)
+        pair = ", ".join(str(unwrap(x)) for x in value)
         refuse([Finding((), "a list of stretches [s_a, s_b], in m", f"write [[{pair}]]")])
     return value
 

@@ -476,13 +476,20 @@ WINCH = {"payout": "write it where a line ends: `lines: {NAME: {connections: {en
 FORBIDDEN = "/."
 
 
+def _as_it_is(name: Any) -> Any:
+    """A name that has no blanks around it: without them it might be another one."""
+    if isinstance(name, str) and name != name.strip():
+        raise ValueError("a name")
+    return name
+
+
 def _a_name(name: str) -> str:
     if not name or any(x in name for x in FORBIDDEN):
         raise ValueError("a name")
     return name
 
 
-Name = Annotated[Text, After(_a_name)]
+Name = Annotated[Text, Before(_as_it_is), After(_a_name)]
 
 
 class FixedPoint(Table):

@@ -75,6 +75,8 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
         record, wrong = None, list(_harmonic_jump(motion))
         if motion.file is not None:
             record, wrong = _judged(moved, motion, time.duration if isinstance(time, Time) else None)
+        if record is not None and isinstance(time, Time):  # what comes later moves nothing
+            record = record.within(time.duration)
         if motion.vessel is not None:
             wrong += _vessel(moved, motion.vessel)
         if not wrong and isinstance(cable, Cable) and not isinstance(moved, Held):
@@ -86,7 +88,7 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
             late += _fast_period(here, motion, step) if isinstance(moved, Held) else ()
     if step is not None:
         late += _fast_spins(tables.get("obstacles"), step)
-    for wrong_load in load_findings(ends, step):
+    for wrong_load in load_findings(ends, step, time.duration if isinstance(time, Time) else math.inf):
         (late if wrong_load.at[0] == "time" else found).append(wrong_load)
     if step is not None:
         late += _fastest_period(ends, environment, step)
@@ -385,7 +387,7 @@ def _rounded_up(x: float) -> str:
 # Whether histories of forces and moments at ends can be read, and are resolved by the time step.
 
 
-def load_findings(ends: Ends, step: float | None) -> Iterator[Finding]:
+def load_findings(ends: Ends, step: float | None, until: float = math.inf) -> Iterator[Finding]:
     """What is wrong with the histories of loads; step: s, if steps are fixed."""
     for name, end in ends.named().items():
         for load in end.loads:
@@ -393,14 +395,14 @@ def load_findings(ends: Ends, step: float | None) -> Iterator[Finding]:
             for found in () if file is None else chain(*unreadable(file, partial(read_history, file))):
                 yield Finding(("ends", name, *load.key[:-1], *found.at), found.expected, found.fix, found.given)
             if step is not None and load.rows:
-                t = _missed(load.rows, step)
+                t = _missed(load.rows, step, until)
                 if t is not None:
                     where = dotted(("ends", name, *load.key))
                     expected = f"steps so short that {where} is nearly straight within each; it turns at t = {t:g} s"
                     yield Finding(("time", "step"), expected, "a smaller step, or a smoother history", f"{step:g}")
 
 
-def _missed(rows: Sequence[Row], step: float) -> float | None:
+def _missed(rows: Sequence[Row], step: float, until: float) -> float | None:
     """Time of a row that departs from a line between two steps by a large part of the range of the history."""
     table = np.array(rows)
     times, values = table[:, 0], table[:, 1:]
@@ -412,7 +414,7 @@ def _missed(rows: Sequence[Row], step: float) -> float | None:
 
     part = ((times - begin) / step)[:, None]
     bow = np.abs(values - (1.0 - part) * interpolated(begin) - part * interpolated(begin + step)).max(axis=1)
-    bow[times < 0.0] = 0.0
+    bow[(times < 0.0) | (times > until)] = 0.0
     return float(times[bow.argmax()]) if bow.max() > MISSED * reach else None
 
 

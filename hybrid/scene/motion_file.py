@@ -7,7 +7,7 @@ import os
 import stat
 from array import array
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -91,6 +91,12 @@ class Record:
         for values in (self.shift, self.rotation):
             if values is not None:
                 yield spline(self.times, values)
+
+    def within(self, end: float) -> Record:
+        """The same without what comes after a time (s), but for rows that a spline up to then needs."""
+        n = max(int(np.searchsorted(self.times, end)) + 3, FEWEST_ROWS)
+        parts = ("times", "shift", "rotation", "shift_unit", "rotation_unit")
+        return replace(self, **{x: y[:n] for x in parts if (y := getattr(self, x)) is not None})
 
 
 def spline(times: Array, values: Array, base: Array | None = None) -> Any:

@@ -64,6 +64,7 @@ TAKEN += ("surface", "attached", "min_bend_radius", "max_tension", "min_tension"
 TAKEN += ("turns", "payout", "energy", "work", "errors", "criteria", "steps", "right", "mesh", "envelope", "limits")
 TAKEN += ("zones", "events", "points", "bodies", "lines", "times", "checkpoint", "scene", "template", "word")
 TAKEN += ("plane", "bounds", "ends", "self_distance", "extremes", "stress_per_tension", "stress_per_curvature")
+TAKEN += ("changes", "contacts", "obstacles", "shape", "max_contact_force")
 TAKEN += ("capacity_used", "capacity", "corner", "capacity_row", "code_used", "code", "code_row", "code_number")
 HALF_TURN = 180.0  # deg
 # The field with the arc length at which a clearance is least: its name after that of the clearance.

@@ -78,6 +78,8 @@ def exceedance(t: ArrayLike, x: ArrayLike, above: float | None = None, below: fl
     if above is None:
         assert below is not None
         values, above = -values, -below
+    if np.isnan(above):
+        raise ResultError("exceedance\n    expected: a number in the unit of the quantity")
     lasts = np.diff(times).reshape(-1, *[1] * (values.ndim - 1))
     least, most = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
     width = np.where(most > least, most - least, 1.0)

@@ -155,6 +155,8 @@ def mooring_use(
         raise ResultError("mooring\n    expected: a strength (N) above 0, and two factors above 0")
     s, T = result.both_sides("tension")
     if isinstance(pretension, int | float):
+        if not 0.0 <= pretension < np.inf:
+            raise ResultError("mooring\n    expected: a pretension in N, 0 or more, or the equilibrium that has it")
         before = np.full(s.shape, float(pretension))
     else:
         if pretension.lines or abs(float(pretension.s[-1] - result.s[-1])) > 1e-6 * float(result.s[-1] - result.s[0]):

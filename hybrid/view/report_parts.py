@@ -95,7 +95,8 @@ def verdict_html(facts: list[Fact], several: bool) -> str:
     """What to know first: what is wrong, else that nothing is; limits as a table; the numbers that matter, large."""
     alarms, notes = attention(facts), [f for f in facts if f.key == "warning" and f.weight == "note"]
     limits = [f for f in facts if f.key.startswith("limits") and f.values]
-    count = sum(len(f.values["limits"]) for f in limits)
+    held = [f for f in facts if f.key == "quantity" and f.values.get("limit") in ("smallest", "largest")]
+    count = sum(len(f.values["limits"]) for f in limits) + len(held)
     if alarms:
         each = [f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in alarms]
         rows, left = "".join(each[:MOST_ROWS]), each[MOST_ROWS:]
@@ -103,6 +104,7 @@ def verdict_html(facts: list[Fact], several: bool) -> str:
         head = f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul>{more}</div>'
     else:
         open_ = sum(x["verdict"] == NOT_VERIFIED for f in limits for x in f.values["limits"])
+        open_ += sum(f.weight == "note" for f in held)
         kept = "no limits were given to hold it against" if not count else f"within all {count} limits"
         kept = "within the one limit" if count == 1 else kept
         kept = f"{open_} of {count} limits not verified" if open_ else kept

@@ -23,7 +23,7 @@ from hybrid.store.envelope import BROKEN, NOT_VERIFIED
 from hybrid.store.reader import Result
 from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study, ranges_of, reasons_of, unmet_accuracy
 from hybrid.store.tables import OURS, Row, TradeTable
-from hybrid.store.verdicts import section_limits
+from hybrid.store.verdicts import quantity_limits, section_limits
 from hybrid.view import report_parts as parts
 from hybrid.view.curves import Store, along, script_json, worst
 from hybrid.view.figure import (
@@ -130,8 +130,9 @@ def _verdict(results: Mapping[str, Result]) -> str:
     lines, bad = [], False
     for name, result in results.items():
         kinds = [event.kind for event, _ in warnings_of(result)]
-        held = section_limits(result)
-        broken, open_ = ([x.limit for x in held if x.verdict == word] for word in (BROKEN, NOT_VERIFIED))
+        held = [(x.limit, x.verdict) for x in section_limits(result)]
+        held += [(x.name, x.verdict) for x in quantity_limits(result)]
+        broken, open_ = ([name for name, verdict in held if verdict == word] for word in (BROKEN, NOT_VERIFIED))
         bad |= bool(kinds or broken) or not result.done
         told = [result.status_text.splitlines()[0], ", ".join(kinds) or "no warnings"]
         told += [f"broken: {', '.join(broken)}"] if broken else []
@@ -158,7 +159,7 @@ def _table(results: Mapping[str, Result]) -> str:
                 continue
             x, part = found[key], ""
             if k and known is not None and abs(known) > ZERO:
-                part = f" ({'+' if x > known else ''}{short(100.0 * (x / known - 1.0), 3)} %)"
+                part = f" ({'+' if x > known else ''}{short(100.0 * (x - known) / abs(known), 3)} %)"
             cells.append(amount(x, r.units[name]) + part)
         rows.append([head, *cells])
     return parts.table_html(rows, ["", *results], numbers=len(results))

@@ -177,6 +177,8 @@ def _doubt(result: Result, name: str, found: Worst) -> str:
     each = along(result, name).of(result, f"errors/total/{name}")
     if each is None or each.ndim != 2:
         return ""
+    if not result.s[0] <= found.s * (1.0 + 1e-9) or not found.s * (1.0 - 1e-9) <= result.s[-1]:
+        return ""  # output.points leave that place out
     if name in not_converged_in(result.attributes):
         return f" ({UNKNOWN})"
     error = float(each[found.output, found.place])

@@ -15,10 +15,12 @@ from rich.table import Table
 import hybrid
 from hybrid.cli import statistics_commands
 from hybrid.cli.console import KINDS_SHOWN, Console, Grid
-from hybrid.cli.tables import _largest_moment
+from hybrid.cli.tables import _largest_moment, equilibrium_facts, errors_facts, errors_table
 from hybrid.errors import EVENTS_BY_WEIGHT, EXPECTED, OF_THE_RUN, ZONE_EVENTS, Outcome
 from hybrid.linear.response_results import ADDED, LineResponse, Response
 from hybrid.store.records import Event
+from hybrid.view.summary import facts_of
+from tests.scenes import cable_scene, pinned_at
 
 PACKAGE = Path(hybrid.__file__).parent
 # Calls that write an event take its kind as a text among their arguments.
@@ -170,3 +172,22 @@ def test_rows_of_a_response_that_is_not_valid_are_marked() -> None:
         assert {row["quantity"] for row in rows if row["valid"]} == valid
         shown = statistics_commands._response_table(Response("", {"cable": line}, {}, {}, 1, {}, notes), rows, 3.0)
         assert "curvature, not valid" in [*shown.columns[0].cells] and ("x" in [*shown.columns[0].cells])
+
+
+def test_output_points_without_the_ends():
+    """The last of them was taken for the fairlead, and its arc length for that of the line."""
+    section = {"length": 250, "mass": 20, "diameter": 0.05, "axial_stiffness": 2e8}
+    bed, ends = {"z": -100, "stiffness": 5e3}, (pinned_at(0, 0, -100), pinned_at(205, 0, 0))
+    part, whole = (
+        hybrid.static(cable_scene(section, *ends, fluid={"density": 1025}, seabed=bed, model="catenary", mesh=10,
+                                  output={"points": [10, 50, 80, *more], "errors": True}))
+        for more in ([], [250])
+    )  # fmt: skip
+    assert "end" not in equilibrium_facts(part).get("uplift", {}) and "±" in tension_of(whole)
+    assert "±" not in tension_of(part)
+    share = float(errors_facts(part)["total_position"]) / 2.5
+    assert f"{share:.2g} % of the length" in str(errors_table(errors_facts(part), part).rows)
+
+
+def tension_of(result):
+    return next(x.text for x in facts_of(result) if x.key == "tension")

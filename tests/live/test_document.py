@@ -227,3 +227,14 @@ def test_examples_are_named_and_begin_scenes() -> None:
 def test_other_files_are_no_examples(name: str) -> None:
     with pytest.raises(Refused):
         example_text(name)
+
+
+def test_lines_that_one_adds_behind_a_line_that_the_other_changes():
+    """They came twice, and the change was lost."""
+    base, mine, theirs = "1\n2\n3\n4\n", "1\n2\n3\nX\n4\n", "1\n2\nT\n4\n"
+    assert merged(base, mine, theirs) == merged(base, theirs, mine) == "1\n2\nT\nX\n4\n"
+
+
+def test_a_name_of_many_bytes_is_refused(tmp_path):
+    with pytest.raises(Refused):
+        Document("a\n", None, tmp_path).save("ü" * 150)

@@ -17,7 +17,8 @@ from viewed import SCENE, Page, served
 import hybrid
 from hybrid.live import session as playing
 from hybrid.live.session import Playback
-from hybrid.live.workers import WatchedRun
+from hybrid.live.workers import WatchedRun, Workers
+from tests.scenes import span
 
 
 @pytest.mark.long
@@ -120,3 +121,34 @@ def test_a_scene_whose_name_begins_with_a_hyphen_is_no_option(tmp_path: Path) ->
     asyncio.run(run.watch())
     assert run.state["ended"] == "complete", run.state
     assert sorted(x.name for x in tmp_path.iterdir()) == ["-rf.h5", "-rf.yaml"]
+
+
+def test_another_run_of_as_many_outputs_is_shown(tmp_path: Path) -> None:
+    """Its text stood beside the frames of the run before."""
+    file, given = tmp_path / "a.h5", {"time": (1, 0.1), "output": {"every": 0.5}}
+    hybrid.run(span(**given), output=file).close()
+    played = Playback(file)
+    played.read()
+    other = span(**given)
+    other["ends"]["end"]["position"] = [80, 0, 20]
+    hybrid.run(other, output=file, overwrite=True).close()
+    assert played.read() == (0, True)
+    assert played.frames[0]["lines"][0]["z"][-1] == 20.0
+
+
+def test_two_pages_at_once_and_one_after_a_process_has_ended() -> None:
+    """The second of two failed, and a process that had ended stayed."""
+    text = (Path(__file__).parents[2] / "examples" / "01_hanging_chain.yaml").read_text(encoding="utf-8")
+    modes = {"do": "modes", "text": text, "file": "x.yaml"}
+
+    async def ask() -> list[bytes | None]:
+        workers = Workers()
+        await workers.start()
+        found = list(await asyncio.gather(*(workers.ask_spare(modes) for _ in range(2))))
+        await workers._spare.stop()
+        await workers.ask_spare(modes)
+        found.append(await workers.ask_spare(modes))
+        await workers.stop()
+        return found
+
+    assert all(x is not None and b'"html"' in x for x in asyncio.run(ask()))

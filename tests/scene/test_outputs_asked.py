@@ -9,10 +9,11 @@ import pytest
 from scene_texts import SUSPENSION
 
 from hybrid.cli.plan_tables import plan_rows
+from hybrid.errors import SceneError
 from hybrid.model.plan import output_times, plan, size_of_result
 from hybrid.scene.analysis import OUTPUTS, PER_PERIOD, UNASKED_BYTES
 from hybrid.scene.read import as_scene, one_line, parse_scene
-from tests.scenes import cable_scene, line_between, network_scene, pinned_at
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at, pulled, span
 
 LINE = {"length": 30.0, "mass": 2.0, "axial_stiffness": 1e6}
 HEAVE = {"heave": {"amplitude": 0.5, "period": 4.0}, "ramp": 8.0}
@@ -63,3 +64,10 @@ def test_a_file_that_nobody_asked_for_has_a_bounded_size() -> None:
 def test_a_plan_says_how_many_and_how_much(every: float | None, said: str) -> None:
     scene = as_scene(cable(900.0, **({"every": every} if every else {})))
     assert said in " ".join(" ".join(plan_rows(scene, plan(scene))).split())
+
+
+@pytest.mark.parametrize("name", ["changes", "obstacles", "contacts", "shape", "max_contact_force"])
+def test_names_that_results_have_are_refused(name: str) -> None:
+    """A run with one crashed, or was told to free some disk space."""
+    with pytest.raises(SceneError, match="quantities"):
+        as_scene(span(output=pulled(name, 1e5)))

@@ -20,7 +20,7 @@ from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel, smooth_step, way_of_smooth_step
 from hybrid.scene.read import parse_scene, validate_scene
 from hybrid.scene.root import Scene
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, pinned_at, span
 
 Array = NDArray[np.float64]
 
@@ -566,3 +566,26 @@ def test_a_run_of_several_lines_says_it_of_points(tmp_path: Path) -> None:
 def test_what_is_refused(tmp_path: Path, motion: dict[str, float], kink: bool, text: str) -> None:
     with pytest.raises(hybrid.SceneError, match=text):
         hybrid.run(scene(table(tmp_path, kink), **motion))
+
+
+def test_what_comes_after_the_end_of_a_run_is_not_judged(tmp_path: Path) -> None:
+    """Runs were refused for a time that they do not compute."""
+    t = np.arange(0, 60.01, 0.25)
+    x = np.minimum(t / 8, 1)
+    z = 2 * x**3 * (10 - 15 * x + 6 * x * x) + 0.5 * np.clip((t - 30) / 8, 0, 1) ** 3 * np.sin(
+        2 * np.pi * (t - 30) / 3.0
+    )
+    table = np.column_stack([t, 80 + 0 * t, 0 * t, z])
+    np.savetxt(tmp_path / "m.csv", table, delimiter=",", header="t,x,y,z", comments="", fmt="%.10g")
+    scene = span(time=(20, 1.5))
+    scene["ends"]["end"]["motion"] = {"file": str(tmp_path / "m.csv")}
+    validate_scene(scene)
+    rows = [[0, 1e3, 0, 1e3], [100, 1e3, 0, 1e3], [100.01, 1e3, 0, 9e3], [100.02, 1e3, 0, 1e3]]
+    for duration in (10, 101):
+        scene = span(time=(duration, 0.1))
+        scene["ends"]["end"] = {"kind": "free", "force": {"history": rows}}
+        if duration == 101:
+            with pytest.raises(SceneError, match=r"100\.01 s"):
+                validate_scene(scene)
+        else:
+            validate_scene(scene)

@@ -19,6 +19,7 @@ from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
 from hybrid.scene.read import as_scene, parse_scene, validate_scene
 from hybrid.scene.schema import CableScene
+from tests.scenes import span
 
 ADAPTIVE = (
     OCEAN.replace(
@@ -524,3 +525,8 @@ def test_a_start_that_is_no_rest_needs_the_direction_of_material_axes(bends: dic
         scene | {"cable": {"sections": [section]}},
     ):
         validate_scene(allowed)
+
+
+def test_a_huge_whole_number_is_refused() -> None:
+    with pytest.raises(SceneError, match="a list of stretches"):
+        as_scene(span(model={"kind": "adaptive", "force_rod": [10**400, 1]}))

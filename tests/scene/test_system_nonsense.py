@@ -115,3 +115,11 @@ def test_a_key_that_is_left_out_is_refused_or_not_needed(path: tuple[str | int, 
         as_scene(scene)
     except SceneError as error:
         assert all(x.expected and x.where for x in error.complaints), str(error)
+
+
+def test_names_with_blanks_around_them_are_refused() -> None:
+    """`m` and `m ` became one, and a line was dropped."""
+    line = line_between("a", "b", {"length": 100, "mass": 2}, model="catenary")
+    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0]}}
+    with pytest.raises(SceneError, match="a name"):
+        as_scene(network_scene(points, {"m": line, "m ": line}))

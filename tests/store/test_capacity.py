@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.errors import SceneError
+from hybrid.errors import ResultError, SceneError
 from hybrid.store.capacity import E301, F201, Row, code_of_steps, collapse, most_used, of_riser, use, used
 from hybrid.store.tables import rows_of
 from tests.combinations.pairs import as_network
 from tests.said import line_of
-from tests.scenes import cable_scene, clamped_at, pinned_at
+from tests.scenes import cable_scene, clamped_at, pinned_at, span
 
 TRIANGLE, BOX = [[100.0, 0.0], [0.0, 2.0]], [[100.0, 0.0], [100.0, 2.0], [0.0, 2.0]]
 BOTH_WAYS = [[100.0, 0.0], [0.0, 2.0], [-50.0, 0.0]]
@@ -402,3 +402,12 @@ def test_refusals():
     tables["cable"]["sections"][1]["code"] = {x: y for x, y in MOORED.items() if x != "environment_factor"}
     with pytest.raises(SceneError, match="environment_factor"):
         hybrid.validate_scene(tables)
+
+
+@pytest.mark.parametrize("pretension", [math.nan, math.inf, -1.0])
+def test_numbers_that_are_none_are_refused(pretension):
+    result = hybrid.run(span(time=(1, 0.1)))
+    with pytest.raises(ResultError, match="a pretension in N"):
+        result.mooring(1e5, (1.2, 1.4), pretension)
+    with pytest.raises(ResultError, match="a number in the unit of the quantity"):
+        result.exceedance("end_force_end", math.nan)

@@ -14,7 +14,7 @@ from reported import reported
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.view.figure import short
-from hybrid.view.several_runs import OF_RUNS, _differences, _ranges_along, _table
+from hybrid.view.several_runs import OF_RUNS, _differences, _ranges_along, _table, _verdict
 
 SCENE = """
 title: {title}
@@ -28,6 +28,7 @@ model: catenary
 mesh: {{cells: 16}}
 """
 from tests.called import Call
+from tests.scenes import cable_scene, clamped_at, pulled, span
 
 
 def test_differences_are_those_at_the_same_instant_and_place() -> None:
@@ -172,3 +173,17 @@ def test_the_command(call: Call) -> None:
     assert Path("a.tension.png").stat().st_size > 1000
     said = call("plot", "a.h5", "--quantity", "tensoin")
     assert said.code == 1 and "tensoin" in said.err
+
+
+def test_a_comparison_tells_broken_quantities():
+    result = hybrid.static(span(output=pulled("pull", 10.0)))
+    assert "broken: pull" in _verdict({"a": result, "b": result})
+
+
+def test_parts_of_negative_values():
+    """A compression that halves was said to change by +-50 %."""
+    rod = {"length": 1, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 200}
+    stands = clamped_at([0, 0, 0], [0, 0, 1])
+    found = [hybrid.static(cable_scene(rod | {"mass": x}, stands, "free", model="rod", mesh=8)) for x in (2.0, 1.0)]
+    text = _table(dict(zip("ab", found, strict=True)))
+    assert "(+50 %)" in text and "+-" not in text

@@ -19,7 +19,9 @@ import hybrid
 from hybrid.errors import ResultError
 from hybrid.view.curves import MOST_VALUES, kept, outline
 from hybrid.view.report import html, write_report
-from tests.scenes import cable_scene, pinned_at
+from hybrid.view.report_parts import verdict_html
+from hybrid.view.summary import facts_of
+from tests.scenes import cable_scene, pinned_at, pulled, span
 
 
 def index_of(page: str) -> dict[str, Any]:
@@ -222,3 +224,9 @@ def test_statistics_are_those_of_the_histories() -> None:
     expected = [found.mean, found.standard_deviation, found.minimum, found.maximum]
     assert [float(x) for x in row.groups()] == pytest.approx([float(x) for x in expected], rel=1e-3)
     assert "Hang off" in page and "above the 10 deg allowed" in page
+
+
+def test_the_head_counts_limits_of_quantities() -> None:
+    """It said that there were no limits, or that the one was kept."""
+    head = verdict_html(facts_of(hybrid.static(span(output=pulled("pull", 1e5)))), False)
+    assert "no limits were given" not in head and "1 of 1 limits not verified" in head
