@@ -443,6 +443,7 @@ class Touching:
     meets: NDArray[np.int64]  # (K, K) whether two of them may touch, or one itself
     friction: Floats  # (K, K) coefficients
     joined: NDArray[np.int64]  # (K, 2) what ends are joined to: those of one number are beside each other
+    points: NDArray[np.int64]  # (K, 2) numbers of their points
 
     def partners(self, number: int) -> tuple[int, ...]:
         """Numbers of the other lines that a line may touch; none where it is not among these."""
@@ -482,7 +483,7 @@ def touching_among(
         reach = self_reach(scene)
         if reach.asked or reach.may:
             meets[j, j], friction[j, j] = 1, line.contact.friction
-    return Touching(tuple(lines), meets, friction, joined_ends_of(network)[lines])
+    return Touching(tuple(lines), meets, friction, joined_ends_of(network)[lines], points_of_ends(network)[lines])
 
 
 # Of the contents of a line that may come to touch others.
@@ -512,6 +513,12 @@ def passing_each_other(scene: SomeScene) -> SomeScene:
 def _may_meet(scene: LineScene) -> bool:
     sections = [*scene.cable.sections, *(x for paid in payouts(scene) for x in paid.reel or ())]
     return scene.accuracy is None and not scene.output.errors and all(x.diameter is not None for x in sections)
+
+
+def points_of_ends(network: Network) -> NDArray[np.int64]:
+    """(L, 2) numbers of the points that ends of lines are at in the scene."""
+    names = [*network.points]
+    return np.array([[names.index(x.start), names.index(x.end)] for x in network.lines.values()], np.int64)
 
 
 def joined_ends_of(network: Network) -> NDArray[np.int64]:

@@ -254,6 +254,8 @@ def slack_on_bed(scene: LineScene, line: Line) -> Hanging | None:
     z[[0, -1]] = start[2], end[2]
     straight = (z > sunk)[:-1] & (z > sunk)[1:]
     level = np.where(straight, 0.0, np.sqrt(np.maximum(h**2 - np.diff(z) ** 2, 0.0)))
+    if not level.any():  # it sinks in by more than it is too long
+        return None
     r = np.column_stack([_polygon(level, span) + start[:2], z])
     r[-1] = end
     low = int(np.argmin(np.append(straight, False)))  # what hangs from the start is above it

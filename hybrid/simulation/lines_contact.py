@@ -7,7 +7,8 @@ Lines that cross between two shapes are found.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,7 @@ from hybrid.kernels.state.books import Clock, Counts
 from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
-from hybrid.model.contents import COST, Touching, joined_ends_of
+from hybrid.model.contents import COST, Touching, joined_ends_of, points_of_ends
 from hybrid.model.network import NetworkModel
 from hybrid.scene.network import Network
 from hybrid.solve.contact import SelfContact, SharedContact, TouchingLine
@@ -330,9 +331,30 @@ FLAT = 1e-9  # volume, over the lengths, of chords that lie in one plane but for
 
 def shared_of(model: NetworkModel, rubs: bool = False) -> SharedContact | None:
     """Contact of the lines of a model with each other, with friction or without; None: they have none."""
-    if model.touching is None:
+    if (among := model.touching) is None:
         return None
-    return SharedContact(model.touching, [strand_in(model.models[k]) for k in model.touching.lines], rubs)
+    now = replace(among, joined=joined_now(among.joined, among.points, model, among.lines))
+    return SharedContact(now, [strand_in(model.models[k]) for k in among.lines], rubs)
+
+
+GAVE_WAY = 1 << 32  # added to the number of what was held, and has come loose with several lines
+
+
+def joined_now(
+    joined: NDArray[np.int64], points: NDArray[np.int64], model: NetworkModel, lines: Sequence[int]
+) -> NDArray[np.int64]:
+    """What ends of lines are joined to, (K, 2) as of Touching: one that has come loose, to nothing else.
+
+    One that has left a point of others is beside these for good: there lines are in each other.
+    """
+    out = joined.copy()
+    for row, at, k in zip(out, points, lines, strict=True):
+        for end, joint in enumerate(model.joints[k]):
+            if joint >= 0 and row[end] == 0:
+                row[end] = GAVE_WAY + joint
+            elif joint < 0 and not model.models[k].ends.values.held[end] and (points == at[end]).sum() == 1:
+                row[end] = -1 - 2 * k - end
+    return out
 
 
 def strand_in(x: Model) -> TouchingLine:
@@ -438,12 +460,12 @@ def watched_pairs(network: Network, model: NetworkModel) -> NDArray[np.int64]:
     return np.argwhere(watched)
 
 
-def _joined_by_place(network: Network, width: float) -> NDArray[np.int64]:
-    """As joined_ends_of, but what is held or moved is one thing only where it is one place at first.
+def _joined_by_place(network: Network, model: NetworkModel, width: float) -> NDArray[np.int64]:
+    """As joined_now, but what is held or moved is one thing only where it is one place at first.
 
     width: m, the largest diameter.
     """
-    joined = joined_ends_of(network)
+    joined = joined_now(joined_ends_of(network), points_of_ends(network), model, range(len(model.models)))
     held = np.argwhere(joined == 0)
     lines = list(network.lines.values())
     at = np.array([network.first_place((lines[k].start, lines[k].end)[end]) for k, end in held]).reshape(-1, 3)
@@ -476,7 +498,7 @@ class LinesWatch:
         for row, x in zip(width, model.models, strict=True):
             row[: x.cells] = diameters(x)
         widest = max((float(x.max()) for x in width), default=0.0)
-        self.joined = _joined_by_place(network, widest)
+        self.joined = _joined_by_place(network, model, widest)
         self._bound: dict[str, Any] = {"joined": self.joined, "begins": begins, "width": np.concatenate(width)}
         self._bound |= {"clock": clock, "pairs": self._pairs, "room": self._room}
         self._bound |= {"moved": np.zeros((len(width), MOVED))}

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.state.report import EACH, FORCE_A, MOMENT_A, STRAND
@@ -22,7 +23,7 @@ from hybrid.model.network import NetworkModel, build_network
 from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.base import nearest
 from hybrid.scene.bodies import BodyShape, FixedBody, FreeBody, HeldBody
-from hybrid.scene.ends import Fairlead, FixedPoint
+from hybrid.scene.ends import Fairlead, FixedPoint, GuidedPoint
 from hybrid.scene.network import JoinedLine, Network
 from hybrid.scene.read import SceneLike, as_scene, read_text, scene_text
 from hybrid.simulation.equilibrium import equilibrium_of
@@ -252,6 +253,7 @@ def _offsets_at(network: Network, at: str, distances: Sequence[float], heading: 
     kind, name = target_of(network, at)
     model = build_network(network)
     found = _equilibrium(network, model)
+    network = network.model_copy(update={"lines": _with_axes(network, model, name)})
     shape = getattr(network.bodies[name], "shape", None) if kind == "body" else None
     if shape is not None:  # which lines may not pass on the way to where they touch it
         network = network.model_copy(update={"lines": _from_where_they_lie(network, found)})
@@ -347,6 +349,33 @@ def _place(network: Network, model: NetworkModel, found: LinesAtRest, point: str
     """Where a point is in an equilibrium."""
     line, end = network.lines_at(point)[0]
     return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
+
+
+def _with_axes(network: Network, model: NetworkModel, point: str) -> dict[str, JoinedLine]:
+    """The lines, with the material axes that clamps have where none are given: no offset twists a line anew.
+
+    point: that is asked for; where it is guided, and holds no twist, it does not when it is held.
+    """
+    lines = dict(network.lines)
+    for l, (name, line) in enumerate(network.lines.items()):
+        axes: dict[str, Any] = {}
+        for k, (end, at) in enumerate((("start", line.start), ("end", line.end))):
+            held, body = network.clamp(name, end), network.body_of(at)
+            if held is None or held.normal is not None or held.swivel or at in network.rigid:
+                continue
+            if isinstance(network.points[at], GuidedPoint):
+                axes |= {end: held.model_copy(update={"swivel": True})} if at == point else {}
+                continue
+            frame = model.models[l].ends.values.frame[k].reshape(3, 3)
+            if isinstance(body, FreeBody):
+                frame = model.seats[l, k, :TURNS].reshape(3, 3)
+            elif body is not None:
+                frame = frame_of(body.rotation).T @ frame
+            back = 2.0 * np.pi * held.turns  # which are counted from the normal
+            normal = np.cos(back) * frame[:, 0] - np.sin(back) * frame[:, 1]
+            axes[end] = held.model_copy(update={"normal": tuple(normal.tolist())})
+        lines[name] = line.model_copy(update={"connections": line.connections.model_copy(update=axes)})
+    return lines
 
 
 def _clamped_as_they_lie(

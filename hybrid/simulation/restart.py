@@ -299,9 +299,11 @@ def kept_resolution(network: Network, source: Path) -> NetworkResolution:
     with opened(source) as file:
         tree = read_checkpoint(file).resolution
     first = NetworkResolution.first(network)
-    if not tree:  # of an earlier program
-        return first
     with refused(source):
+        if not isinstance(tree, Mapping):
+            raise ValueError("resolutions of no line")
+        if not tree:  # of an earlier program
+            return first
         tree = {next(iter(network.lines)): tree} if is_of_cable(tree) else tree
         if set(tree) != set(network.lines):
             raise ValueError("resolutions of other lines")

@@ -433,7 +433,7 @@ def _may_begin(run: RunOfLines, pair: Pair) -> bool:
     energy, shared = energy_between(model, run.solver.lines, run.solver.bodies.copy(), run.state)
     if not math.isfinite(energy):
         return False
-    joined = dict(zip(among.lines, among.joined.tolist(), strict=True))
+    joined = dict(zip(among.lines, shared.contact.joined.tolist(), strict=True))
     models, r = run.model.models, [x.r for x in run.state.lines]
     wide = OUTER * float(max(diameters(models[k]).max() for k in pair))
     return not any(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import Outcome
+from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.machine.binding import Table
@@ -204,7 +206,7 @@ class RunLine:
         right[marked] = nodes + np.arange(marked.size)
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
-        books.clock.least_peak = np.inf
+        books.clock.least_peak, books.clock.largest_peak = np.inf, -np.inf
         books.counts.stiff, books.counts.varies = self.model.inextensible, self.model.layout is not None
         books.clock.rho = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         books.clock.wave_step = wave_step(line, self.model.tension_scale)
@@ -257,6 +259,10 @@ class RunLine:
         self.contact = SelfContact(
             model.line, diameters(model), least_bending(model), model.tension_scale, self.scene.contact.friction
         )
+        places = [x.held_position for x in self.scene.ends.both if x.held_position is not None]
+        if model.held is not None and len(places) == 2:  # ends that lay in each other go on as neighbours
+            near = math.dist(places[0], places[1]) <= OUTER * float(diameters(model).max())
+            self.contact.contact.joined[:] = 0 if near else -1
         if before is not None:
             self.contact.restore(before.checkpoint(t), t, remeshed=other)
         self._touching = model
@@ -296,7 +302,8 @@ class RunLine:
             text = f"the line rests with a twist of {turns:+.2g} turns, and what it is clamped to may turn back"
             where = f"{text}: begin nearer to rest (initial_guess, initial_rotation), unless it is meant"
             self.events.event(0.0, 0.0, self.model.length, "several equilibria", where)
-        note_laid(self.scene, self.model, state, self.events)
+        if max(x.joints) < 0:  # else other lines say where a knot lies
+            note_laid(self.scene, self.model, state, self.events)
         self.note_start(x, state, t)
 
     def note_start(self, x: JoinedLine, state: State, t: float | None) -> None:

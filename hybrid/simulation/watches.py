@@ -257,7 +257,7 @@ class SchemeWatch:
         clock = books.clock
         low, high, moved = float(clock.least_peak), float(clock.largest_peak), float(clock.moved)
         steps, rho, worst = int(books.counts.measured), float(books.clock.rho), books.worst.tolist()
-        hardly = moved <= HARDLY_MOVED * length and not high - low > HARDLY_MOVED * high
+        hardly = moved <= HARDLY_MOVED * length and not high - low > HARDLY_MOVED * max(high, -low)
         if hardly or not steps or not moved > 0.0:
             return
         once, several = worst[0], worst[min(steps, b.WORST) - 1]

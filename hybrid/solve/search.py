@@ -28,7 +28,7 @@ from hybrid.kernels.state.report import (
     STIFFNESS,
     TOUCHES,
 )
-from hybrid.kernels.state.state import NO_SHEAVES, Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_SHEAVES, Floats, Line, Sea, State
 from hybrid.model.sea import ONSET
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.stability import (
@@ -180,10 +180,7 @@ def pulled(
     """
     calm = _in_still_water(smooth, states, tally)
     how = f"{PULLED} from where it lay without tension{' in still water' if calm is not None else ''}"
-    rest = (states if calm is None else calm).copy()
-    for k in lines:
-        x = rough.lines[k]
-        rest.lines[k] = laid_without_tension(x.line, x.sea, x.ends, rest.lines[k])  # type: ignore[index]
+    rest = _laid(rough, lines, states if calm is None else calm)
     yield Attempt(how, *tally.counted(rough.newton(rest)), rough)
     if calm is not None:
         for part in GROWING:
@@ -502,35 +499,83 @@ def damped_bodies(bodies: Floats, time_scale: float) -> Floats:
 # A line that lies somewhere without tension, before it is pulled to its equilibrium with friction.
 
 
-def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> State:
+def _laid(rough: NetworkSolver, lines: Sequence[int], states: NetworkState) -> NetworkState:
+    """A copy of an equilibrium whose lines of these numbers are laid without tension, from what holds them on.
+
+    A free point goes with the lines that lie there, on the mean of their ways where they do not agree.
+    """
+    out, left, moved, points = states.copy(), [*lines], dict[int, Floats](), len(rough.net)
+
+    def known(k: int) -> NDArray[np.bool_]:
+        x = rough.lines[k]
+        return np.array([h == 1 or j >= points or j in moved for h, j in zip(x.ends.held, x.joints, strict=True)])
+
+    def lies(k: int) -> bool:
+        x, held = rough.lines[k], known(k)
+        return bool((held & _lying(x.line, x.sea, held, states.lines[k])[[0, -1]]).any())
+
+    while left:
+        now, ways = [k for k in left if lies(k)] or left, dict[int, list[Floats]]()
+        for k in now:
+            x, held = rough.lines[k], known(k)
+            by = np.array([moved.get(j, np.zeros(3)) for j in x.joints])
+            out.lines[k] = laid_without_tension(x.line, x.sea, held, by, states.lines[k])  # type: ignore[index]
+            for end, joint in enumerate(x.joints):
+                way = out.lines[k].r[-end] - states.lines[k].r[-end]
+                if joint >= 0 and not held[end] and way.any():  # else the line does not lie there
+                    ways.setdefault(joint, []).append(way)
+        moved |= {point: np.mean(x, axis=0) for point, x in ways.items()}
+        left = [k for k in left if k not in now]
+    for k, x in enumerate(rough.lines):
+        for end, joint in enumerate(x.joints):
+            if joint in moved:
+                out.lines[k].r[-end] = states.lines[k].r[-end] + moved[joint]
+                _follow(out.lines[k])
+    return out
+
+
+def laid_without_tension(line: Line, sea: Sea, held: NDArray[np.bool_], moved: Floats, state: State) -> State:
     """A copy of an equilibrium whose stretches on the bed and on obstacles have their unstretched length.
 
     It has no friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without
     such an end, or with two, keeps the place of its middle.  The displacement of a node from here is the travel that
-    friction opposes (docs/theory.md, T17b).
+    friction opposes (docs/theory.md, T17b).  held: (2,) whether ends are; moved: (2, 3) m, how far they have gone.
     """
     laid, cells = state.copy(), line.h.size
     laid.slip[:] = 0.0
-    touches = np.asarray(on_obstacles(line, sea, state).any(axis=0))
-    if line.bits & SEABED:
-        touches |= planes_under(sea, state.r)[1] > 0.5 * sea.onset
-    touches[0] |= bool(ends.held[0]) and bool(touches[1])
-    touches[cells] |= bool(ends.held[1]) and bool(touches[cells - 1])
+    touches = _lying(line, sea, held, state)
     shortening = (line.h / np.linalg.norm(state.e, axis=1) - 1.0)[:, None] * state.e
     for first, last in _stretches(touches):
         shift = np.vstack([np.zeros(3), np.cumsum(shortening[first:last], axis=0)])
-        count, held = last - first, (first == 0 and ends.held[0], last == cells and ends.held[1])
+        count, fixed = last - first, (first == 0 and held[0], last == cells and held[1])
         kept = 0.5 * (shift[count // 2] + shift[(count + 1) // 2])  # of the middle, between two nodes if need be
-        if any(held) and not all(held):
-            kept = shift[0 if held[0] else count]
+        if all(fixed):
+            kept = kept - moved.mean(axis=0)
+        elif any(fixed):
+            kept = shift[0] - moved[0] if fixed[0] else shift[count] - moved[1]
         laid.r[first : last + 1] += shift - kept
-    for k in np.flatnonzero(ends.held):
-        laid.r[-k] = state.r[-k]
+    for k in np.flatnonzero(held):
+        laid.r[-k] = state.r[-k] + moved[k]
+    _follow(laid)
+    return laid
+
+
+def _lying(line: Line, sea: Sea, held: NDArray[np.bool_], state: State) -> NDArray[np.bool_]:
+    """Nodes (N+1,) that lie on the bed or on an obstacle, with ends that are held beside one."""
+    touches = np.asarray(on_obstacles(line, sea, state).any(axis=0))
+    if line.bits & SEABED:
+        touches |= planes_under(sea, state.r)[1] > 0.5 * sea.onset
+    touches[0] |= bool(held[0]) and bool(touches[1])
+    touches[-1] |= bool(held[1]) and bool(touches[-2])
+    return touches
+
+
+def _follow(laid: State) -> None:
+    """Let chords and directors follow the nodes."""
     laid.e[:] = np.diff(laid.r, axis=0)
     d = laid.e / np.linalg.norm(laid.e, axis=1)[:, None]
     across = laid.a1 - np.einsum("ij,ij->i", laid.a1, d)[:, None] * d
     laid.a1[:] = across / np.linalg.norm(across, axis=1)[:, None]
-    return laid
 
 
 def _stretches(touches: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -451,7 +451,7 @@ def rubs_on(line: Line, sea: Sea, held: np.ndarray, state: State) -> list[str]:
     At other nodes than ends (2,) that are held, which no friction moves.
     """
     free, found = np.ones(line.s.size, bool), []
-    free[[0, -1]] = held == 0
+    free[[0, -1]] = held != 1
     bed = line.bits & SEABED and (sea.friction.any() or (sea.soil.size and sea.soil[LATERAL] > 0.0))
     if bed and (planes_under(sea, state.r)[1][free] > 0.0).any():
         found.append(ON_BED)

@@ -398,3 +398,28 @@ def test_lines_that_bear_too_much_after_one_step_break_after_it(order: str) -> N
     ))  # fmt: skip
     (when,) = {x.t for x in found.events if x.kind == "end released"}
     assert 0.3 < when < 0.6 and np.abs(found.lines["c"].position[-1, -1, 0]) < 1e-9
+
+
+def falling(breaks: bool) -> dict[str, Any]:
+    """A line that falls on another one with its free end, which a point has held or not."""
+    bar = {"length": 2.0, "mass": 1.0, "diameter": 0.05, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
+    tip: dict[str, Any] = {"kind": "free", "initial_guess": [0.3, 0.1, 0.3]}
+    if breaks:
+        tip = {"position": [0.3, 0.1, 0.3], "break_at": {"time": 0.001}}
+    ways: dict[str, Any] = {"A": [[0.3, -1.9, 0.3], [0.3, 0.1, 0.3]], "B": [[0, 0, 0], [2, 0, 0]]}
+    lines = {
+        name: line_between(*ends, bar | {"length": length}, mesh=10, initial={"kind": "points", "points": ways[name]})
+        for name, ends, length in (("A", "ab", 2.0), ("B", "cd", 1.99))
+    }
+    points = {"a": {"position": ways["A"][0]}, "b": tip} | {
+        x: {"position": y} for x, y in zip("cd", ways["B"], strict=True)
+    }
+    return network_scene(points, lines, contact={}, time=(0.35, 0.001), output=0.05)
+
+
+@pytest.mark.long
+def test_a_loose_end_touches_beside_where_others_are_held() -> None:
+    """It went through, as one that is held there."""
+    loose, free = (hybrid.run(falling(x)) for x in (True, False))
+    assert [x.kind for x in loose.events] == ["end released", "lines touch"]
+    assert loose.lines["A"].position[-1, -1, 2] == pytest.approx(free.lines["A"].position[-1, -1, 2], abs=0.01)

@@ -404,3 +404,14 @@ def test_a_tether_far_from_itself_does_not_stall() -> None:
     assert result.attributes["effort_runs"] <= 6 and result.attributes["cells"] < 1500
     assert len(result["steps/t"]) < 1500
     assert not kinds(result) & {"line touches itself", "line meets itself", "no error figure"}
+
+
+def test_a_loop_opens_where_its_ends_were_in_each_other() -> None:
+    """Let go, they were no neighbours any more, and in each other: the run stopped."""
+    rope = {"length": 2.0, "mass": 1.0, "diameter": 0.05, "axial_stiffness": 1e5, "bending_stiffness": 1.0}
+    heights = []
+    for gap in (0.0, 0.03, 0.06):  # of 0.05 m; the last are apart
+        ends = pinned_at(0, 0, 0), pinned_at(gap, 0, 0, release_at={"time": 0.05})
+        made = cable_scene(rope, *ends, model="rod", mesh=40, time=(0.4, 0.002), output=0.05, contact={"self": True})
+        heights.append(float(hybrid.run(made).position[-1, -1, 2]))
+    assert heights[1] == pytest.approx(0.5 * (heights[0] + heights[2]), abs=0.005)

@@ -374,3 +374,13 @@ def test_what_a_kernel_writes_into_a_table_it_does_not_read_there() -> None:
         name: re.findall(r"job\.task\.(?:cv|ca|dt)\b", next(folder.rglob(f"{name}.py")).read_text()) for name in inlined
     }
     assert not any(read.values()), read
+
+
+@pytest.mark.parametrize("end", [{"kind": "free"}, pinned_at(1.3, 0.3, 4.5)])
+def test_a_rod_that_stands_still_in_compression_has_no_coarse_steps(end: dict[str, Any]) -> None:
+    """Its round-off was off by 100 %, because its largest tension was no more than 0."""
+    rod = {"length": 5, "mass": 5, "diameter": 0.05, "bending_stiffness": 2e4, "axial_stiffness": 1e6}
+    found = hybrid.run(
+        cable_scene(rod, clamped_at([0, 0, 0], [0.3, 0.1, 1]), end, model="rod", mesh=10, time=(1.0, 0.01))
+    )
+    assert "coarse step" not in kinds(found)

@@ -481,3 +481,31 @@ def test_between_held_points_the_first_shape_carries_the_frame(points: dict[str,
     )
     alone, joined = build(one_line(scene)), build_network(in_full(scene)).models[0]
     assert np.allclose(joined.ends.values.frame, alone.ends.values.frame, rtol=0, atol=1e-12)
+
+
+PIPE = {"length": 60, "mass": 10, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 2e4}
+DOWN, FAR = clamped_at([0, 0, 0], [1, 0, -1]), clamped_at([40, 3, 5], [1, 0.3, 1])
+ALIKE: dict[str, Any] = {"mesh": 20, "fluid": {"density": 1025}}
+HELD: dict[str, Any] = {
+    "body:B": network_scene(
+        {"b": {"position": [60, 5, -40]}, "fb": {"body": "B", "place": [1, 0, -1]}},
+        {"m": line_between("fb", "b", PIPE, mesh=20, connections={
+            "start": {"tangent": [0.6, 0, -0.8]}, "end": {"tangent": [0.3, 0, -0.9]}})},
+        bodies={"B": {"position": [30, 0, 0], "rotation": [3, 4, 5]}}, fluid={"density": 1025}),
+    "point:end": cable_scene(PIPE, DOWN, FAR, **ALIKE),
+    "point:end, turned": cable_scene(PIPE | {"torsional_stiffness": 1.5e4}, DOWN, FAR | {"turns": 0.3}, **ALIKE),
+    "point:end, guided": cable_scene(
+        PIPE, DOWN, {"kind": "guided", "tangent": [1, 0.3, 1], "force": [500, 200, 3000]}, **ALIKE),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_forces_at_offsets_change_as_the_stiffness_says(name: str) -> None:
+    """Lines that both ends hold against twist were twisted anew at every offset: a fourth of a column."""
+    at, step = name.split(",")[0], 1e-3
+    stiffness = hybrid.stiffness(HELD[name], at).lines
+    for k, heading in enumerate((0.0, 90.0)):
+        found = hybrid.offsets(HELD[name], at, [-step, step], heading)
+        both = found.force if found.moment is None else np.hstack([found.force, found.moment])
+        expected = stiffness[:, k]
+        assert (both[0] - both[1]) / (2 * step) == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())

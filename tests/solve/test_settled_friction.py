@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from hybrid.errors import Outcome
 from hybrid.scene.analysis import RodModel
 from hybrid.scene.root import in_full
 from hybrid.solve.stepper import LineFailed
-from tests.scenes import cable_scene, network_scene, pinned_at
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
@@ -356,3 +357,52 @@ def test_compression_that_friction_holds_is_told_at_rest() -> None:
     (told,) = [event for event in leg.events if event.kind == "slack"]
     lowest = float(leg.s[int(np.argmin(leg.tension))])
     assert "friction holds it on the seabed" in told.text and abs(told.s_a - lowest) < 3.0
+
+
+# --- lines that are joined on the bed --------------------------------------------------------------
+
+LINKS = {"mass": 10, "diameter": 0.05, "axial_stiffness": 1e7}
+LEVEL = {"z": -5, "stiffness": 1e5, "friction": 0.5}
+CUTS = (0, 10, 20, 30, 65)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("mass", [0, 500])
+def test_a_chain_in_pieces_settles_as_one(mass: float, order: int) -> None:
+    """Pieces were laid as between two anchors: 1649 N at the anchor, which are 138 N in one piece."""
+    clumps = [{"kind": "clump", "at": x, "mass": mass} for x in (20, 30)] if mass else None
+    ends, like = (pinned_at(0, 0, -5), pinned_at(60, 0, 8)), {"model": "catenary", "seabed": LEVEL}
+    one = hybrid.static(cable_scene(LINKS | {"length": 65}, *ends, mesh=65, attachments=clumps, **like))
+    points: dict[str, Any] = {"k0": {"position": [0, 0, -5]}, "k4": {"position": [60, 0, 8]}}
+    points |= {f"k{i}": {"initial_guess": [CUTS[i], 0, -5], "mass": mass if i > 1 else 0} for i in (1, 2, 3)}
+    lines = {}
+    for i, (a, b) in enumerate(pairwise(CUTS)):
+        names = [f"k{i}", f"k{i + 1}"][:: -1 if i == 1 else 1]
+        lines[f"l{i}"] = line_between(*names, LINKS | {"length": b - a}, model="catenary", mesh=b - a)
+    many = hybrid.static(network_scene(points, dict([*lines.items()][::order]), seabed=LEVEL))
+    for point, own in (("k0", one["reaction_start"]), ("k4", one["reaction_end"])):
+        assert many[f"points/{point}/force"][-1] == pytest.approx(-own[-1], abs=0.1)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_clump_where_one_line_alone_lies_is_held_in_any_order(order: int) -> None:
+    points: dict[str, Any] = {"a": {"position": [0, 0, -5]}, "d": {"position": [40, 0, 10]}}
+    points["k"] = {"initial_guess": [20, 0, -5], "mass": 5000}
+    lines = {
+        f"l{x}": line_between(x, "k", LINKS | {"length": length}, model="catenary", mesh=20)
+        for x, length in (("a", 20), ("d", 25.05))
+    }
+    found = hybrid.static(network_scene(points, dict([*lines.items()][::order]), seabed=LEVEL))
+    assert abs(found["points/a/force"][-1, 0]) < 100.0
+    assert "static friction neglected" not in [x.kind for x in found.events]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_bridle_on_the_bed_is_not_laid_one_of_many_ways(order: int) -> None:
+    points = {"a": {"position": [0, -5, -5]}, "b": {"position": [0, 5, -5]}, "d": {"position": [60, 0, 5]}}
+    points["k"] = {"initial_guess": [19, 0, -5], "mass": 50}
+    chain = LINKS | {"length": 20}
+    lines = {name: line_between(name, "k", chain, model="catenary", mesh=20) for name in "ab"}
+    lines["d"] = line_between("k", "d", LINKS | {"length": 43}, model="catenary", mesh=40)
+    tables = network_scene(points, dict([*lines.items()][::order]), seabed={"z": -5, "stiffness": 1e4})
+    assert "laid one way" not in [x.kind for x in hybrid.static(tables).events]

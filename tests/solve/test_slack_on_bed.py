@@ -109,3 +109,12 @@ def test_the_softest_motion_of_a_strut_is_that_of_euler(cells: int) -> None:
     aside = np.hypot(shape[:, 1], shape[:, 2])  # in whichever plane through the line
     np.testing.assert_allclose(aside / aside.max(), np.sin(q * model.line.s), atol=1e-3)
     assert 1.0 <= aside.max() < math.sqrt(2.0) + 1e-9
+
+
+def test_a_line_that_sinks_by_more_than_it_is_too_long_hangs() -> None:
+    """Nothing of it lies in its first shape: a division by zero."""
+    chain = {"length": 10, "mass": 100, "diameter": 0.05, "axial_stiffness": 1e8}
+    bed = {"z": 0, "stiffness": 1e3}
+    scene = cable_scene(chain, pinned_at(0, 0, 0), pinned_at(0.05, 0, 9.5), model="catenary", mesh=40, seabed=bed)
+    found = hybrid.static(scene)
+    assert found.tension[-1].min() > 0.0 and -0.5 < np.min(found.position[-1, :, 2]) < 0.0

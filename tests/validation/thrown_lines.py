@@ -95,7 +95,7 @@ def throw(
     count = len(models)
     touching = Touching(
         tuple(range(count)), np.ones((count, count), np.int64), np.full((count, count), friction),
-        np.full((count, 2), -1, np.int64),
+        np.full((count, 2), -1, np.int64), np.arange(2 * count).reshape(count, 2),
     )  # fmt: skip
     shared = None
     if several:
