@@ -335,9 +335,9 @@ def with_clamps(model: Model, clamped: Model, ends: Sequence[int]) -> Model:
     for k in ends:
         for name, values in new.items():
             values[-k] = getattr(clamped.line, name)[-k]
-    line = line._replace(torsion=clamped.line.torsion, **new)
-    if model.layout is None:
-        return replace(model, line=line)
+    slip = {name: getattr(clamped.line, name).copy() for name in ("slip_law", "slip_now")}  # as wide as springs ask for
+    line = line._replace(torsion=clamped.line.torsion, **slip, **new)
     held = ("held_tangent", "held_twist", "springs", "hinged")
     cable = replace(model.cable, **{name: getattr(clamped.cable, name) for name in held})
-    return replace(model, line=line, cable=cable, on_base=LineOnBase(cable, model.layout.base))
+    model = replace(model, line=line, cable=cable)
+    return model if model.layout is None else replace(model, on_base=LineOnBase(cable, model.layout.base))

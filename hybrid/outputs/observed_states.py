@@ -77,8 +77,9 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
     for kind, same in groupby(zones, lambda zone: zone.kind):
         first, *others = same
         s_a, s_b = first.s_a, (others[-1] if others else first).s_b
-        bounds = [s_a, *(x for x in loads if s_a + near < x < s_b - near), s_b]
-        parts += [Zone(kind, a, b) for a, b in pairwise(bounds)]
+        bounds = [s_a]
+        bounds += [x for before, x in pairwise([s_a, *sorted(loads)]) if max(before, s_a) + near < x < s_b - near]
+        parts += [Zone(kind, a, b) for a, b in pairwise([*bounds, s_b])]
     return tuple(parts)
 
 

@@ -155,7 +155,7 @@ class Survey:
         disturbed = [*joints, *model.attached]
         disturbed += [x for x, held in zip((0.0, model.length), material.held_tangent, strict=True) if held]
         x = np.linspace(0.0, model.length, SAMPLES)
-        found = layers(x, demand.s, fade, disturbed, LAYER if self.given is None else self.given)
+        found = layers(x, demand.s, fade, sorted({*disturbed}), LAYER if self.given is None else self.given)
         if self.along:  # as short where curvature changes within such a length, as where contact begins
             jumps = np.where(rod, self._jumps(), self._bent())  # a catenary has the bends that it shows, and no sharper
             part = np.sqrt(jumps / demand.curvature.max(initial=1e-300))

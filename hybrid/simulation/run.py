@@ -132,6 +132,7 @@ class Run(RecordedRun):
                 part.at_rest()
             turned = self.turned
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
+                line.held = x.ends.held
                 line.note_equilibrium(x, state, None, self.found, turned)
             self.renew_other()
             self.loop.attach(solver, self.state, self.other)

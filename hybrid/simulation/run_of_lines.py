@@ -166,7 +166,7 @@ class RunOfLines:
         contacts, shared = next(y for part in self.parts if (y := part.touching(remeshes)) is not None)
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
-            line.held = np.minimum(x.ends.held, 1)
+            line.held = x.ends.held
         self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])

@@ -530,7 +530,7 @@ def _laid(rough: NetworkSolver, lines: Sequence[int], states: NetworkState) -> N
         for end, joint in enumerate(x.joints):
             if joint in moved:
                 out.lines[k].r[-end] = states.lines[k].r[-end] + moved[joint]
-                _follow(out.lines[k])
+                _chords_anew(out.lines[k])
     return out
 
 
@@ -556,7 +556,7 @@ def laid_without_tension(line: Line, sea: Sea, held: NDArray[np.bool_], moved: F
         laid.r[first : last + 1] += shift - kept
     for k in np.flatnonzero(held):
         laid.r[-k] = state.r[-k] + moved[k]
-    _follow(laid)
+    _chords_anew(laid)
     return laid
 
 
@@ -570,7 +570,7 @@ def _lying(line: Line, sea: Sea, held: NDArray[np.bool_], state: State) -> NDArr
     return touches
 
 
-def _follow(laid: State) -> None:
+def _chords_anew(laid: State) -> None:
     """Let chords and directors follow the nodes."""
     laid.e[:] = np.diff(laid.r, axis=0)
     d = laid.e / np.linalg.norm(laid.e, axis=1)[:, None]

@@ -301,7 +301,7 @@ def accuracy_of_case(result: Result) -> tuple[str, float]:
     found = [(name, line, asked) for name, line in result.each_line() for asked in asked_accuracy(line)]
     if not found:
         return "", np.nan
-    used = max(float(line.attributes.get("accuracy_used", np.nan)) for _, line, _ in found)
+    used = float(np.fmax.reduce([float(line.attributes.get("accuracy_used", np.nan)) for _, line, _ in found]))
     for verdict in (MISSED, NOT_VERIFIED):
         for name, line, asked in found:
             if asked.verdict == verdict:

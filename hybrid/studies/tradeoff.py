@@ -98,6 +98,9 @@ def trade(
         rows = [replace(best, status=REFERENCE)]
         limits: list[tuple[float | None, float | None]] = [(None, None)]
         largest, lengths = _largest_end_force(reference_values), _lengths(tables)
+        if not largest and wanted.position is None:
+            expected = "an error of position, because no end is held and no force compared"
+            raise SceneError([Complaint("for", target, expected, '--for "3 cm"')])
         try:
             check = _compared(store, run_spec(tables, rod, _coarser(goal)), reference_values, lengths)
             rows.append(replace(check, status=CHECK) if check.status != FAILED else check)

@@ -359,3 +359,17 @@ def test_what_is_asked_along_a_cable_without_bending_stiffness(asked: dict[str, 
     result = hybrid.static(hung_level(80.0, sections=[HEAVY]) | {"accuracy": asked})
     assert not [event for event in result.events if event.kind == "accuracy missed"]
     assert len(result.mesh[0].s) < 2000
+
+
+def test_places_that_are_nearly_one_have_one_side_each() -> None:
+    """A clump 1e-8 m behind the end of a section shifted all moments behind it by a cell."""
+    found = []
+    for at in (66.66666667, 66.66666666):
+        rod = {"length": 33.33333333, "mass": 3, "diameter": 0.05, "axial_stiffness": 1e6}
+        sections = [rod | {"bending_stiffness": x} for x in (300, 600, 300)]
+        scene = cable_scene(
+            sections, pinned_at(0, 0, 0), clamped_at([90, 0, 0], [1, 0, -0.3]), model="rod", mesh=60,
+            attachments=[{"kind": "clump", "at": at, "mass": 20}], output={"points": [0, 50, 70, 99]}
+        )  # fmt: skip
+        found.append(hybrid.static(scene).bending_moment[0])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-4)

@@ -509,3 +509,76 @@ def test_forces_at_offsets_change_as_the_stiffness_says(name: str) -> None:
         both = found.force if found.moment is None else np.hstack([found.force, found.moment])
         expected = stiffness[:, k]
         assert (both[0] - both[1]) / (2 * step) == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+
+
+# --- at a point that a line carries: of those at a free point the first ----------------------------
+
+LEFT_RIGHT = (("l", "a", 0.7), ("r", "b", -0.7))
+
+
+def mirrored(mass: float, **more: Any) -> list[hybrid.Result]:
+    """Two lines that mirror each other, clamped to a free point."""
+    rod = {
+        "mass": 3.0,
+        "diameter": 0.05,
+        "axial_stiffness": 1e6,
+        "bending_stiffness": 300.0,
+        "torsional_stiffness": 200.0,
+    }
+    given = {x: more.pop(x) for x in ("mesh",) if x in more}
+    lines = {
+        name: line_between(
+            start, "m", rod | {"length": 30.0}, model="rod", connections={"end": {"tangent": [x, 0, -0.7]}}, **given
+        )
+        for name, start, x in LEFT_RIGHT
+    }
+    points: dict[str, Any] = {"a": {"position": [-27, 0, 0]}, "b": {"position": [27, 0, 0]}}
+    points["m"] = {"initial_guess": [0, 0, -10]} | ({"mass": mass} if mass else {})
+    return [*hybrid.static(network_scene(points, lines, **more)).lines.values()]
+
+
+def test_tension_at_a_clamp_of_a_free_point_is_that_of_either_line() -> None:
+    """The first had what its cells lead to, which changes within less than a cell: 817 for 758 N."""
+    one, other = (x.tension[0, -1] for x in mirrored(50, mesh=50))
+    assert one == pytest.approx(other, rel=1e-6)
+
+
+@pytest.mark.parametrize("mass", [0, 50])
+def test_cells_beside_a_clamp_at_a_free_point_are_those_of_either_line(mass: float) -> None:
+    one, other = (x["mesh/s"] for x in mirrored(mass, accuracy="1%", fluid={"density": 1025}))
+    assert one == pytest.approx(other)
+
+
+def test_a_clump_of_a_milligram_at_a_guided_end_changes_no_tension() -> None:
+    end = {"kind": "guided", "tangent": [1, 0, 0.2], "force": [300, 0, 600]}
+    start, section = (
+        {"kind": "pinned", "position": [0, 0, 0]},
+        PIPE | {"length": 30, "mass": 3.0, "bending_stiffness": 300.0},
+    )
+    found = [
+        hybrid.static(cable_scene(section, start, end, attachments=x, model="rod", mesh=50)).tension[0, -1]
+        for x in (None, [{"kind": "clump", "at": 30, "mass": 1e-6}])
+    ]
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
+def test_layers_at_a_clamp_of_a_free_point() -> None:
+    """Layers that stick are a bending stiffness: the line that carries the point had none of them there."""
+
+    def moment(**laws: Any) -> np.ndarray:
+        rod = {"length": 5, "mass": 3, "diameter": 0.05, "axial_stiffness": 1e6, "torsional_stiffness": 200} | laws
+        held: dict[str, Any] = {"l": {"start": {"tangent": [1, 0, 0]}, "end": "clamped"}}
+        held["m"] = {"start": "clamped", "end": {"tangent": [1, 0, 0.3]}}
+        lines = {
+            x: line_between(*y, rod, model="rod", mesh=20, connections=held[x]) for x, y in (("l", "am"), ("m", "mb"))
+        }
+        points = {
+            "a": {"position": [0, 0, 0]},
+            "b": {"position": [9, 0, 0]},
+            "m": {"kind": "free", "initial_guess": [4.5, 0, -2]},
+        }
+        found: np.ndarray = hybrid.static(network_scene(points, lines)).lines["l"].bending_moment[0]
+        return found
+
+    layers = moment(bending_stiffness=300, bending_slip=[{"stiffness": 500, "moment": 4000}])
+    np.testing.assert_allclose(layers, moment(bending_stiffness=800), rtol=1e-9)

@@ -18,12 +18,13 @@ from hybrid.scene.study import Kept, read_study, study_from
 from hybrid.statistics.fatigue import YEAR, life_in_years
 from hybrid.statistics.moments import exceedance
 from hybrid.store.histories import history_of
-from hybrid.store.study_file import open_study, unmet_accuracy
+from hybrid.store.study_file import accuracy_of_case, open_study, unmet_accuracy
 from hybrid.studies.cases import Cases, cases_of
 from hybrid.studies.study import _created, _refuse_limits_not_there, _remove_cases
 from hybrid.studies.workers import Job, compute_batch, write_outcomes
 from hybrid.view.several_runs import html
 from tests.called import Call
+from tests.scenes import line_between, network_scene
 
 pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
 
@@ -292,3 +293,20 @@ def test_the_summary_and_the_page_say_so(table: Path, as_json: bool, capsys: pyt
     for text in ("3 of 5 cases missed the accuracy asked, case 2 most of all (", "leave mesh", "1 of 5 cases have the"):
         assert text in told.err and text in html(table)
     assert "accuracy_used" not in told.out
+
+
+@pytest.mark.parametrize("order", [["few", "many"], ["many", "few"]])
+def test_the_largest_share_of_what_was_asked_is_found_in_any_order_of_lines(order):
+    """A line first of which no error is known hid by how much another one missed."""
+    section = {"length": 30, "mass": 1.5, "diameter": 0.03, "axial_stiffness": 1e6, "drag": {"normal": 1.2}}
+    of = {"few": ("a", 2), "many": ("b", 8)}
+    lines = {name: line_between(of[name][0], "m", section, model="catenary", mesh=of[name][1]) for name in order}
+    heave = {"heave": {"amplitude": 0.5, "period": 5}, "ramp": 3}
+    points = {
+        "a": {"position": [0, 0, 0]},
+        "b": {"position": [50, 0, 0]},
+        "m": {"position": [25, 0, -10], "motion": heave},
+    }
+    found = hybrid.run(network_scene(points, lines, fluid={"density": 1025}, time=6, output=(0.5, 11), accuracy="0.1%"))
+    verdict, used = accuracy_of_case(found)
+    assert "line many" in verdict and used > 1.0

@@ -490,3 +490,21 @@ def test_a_picture_without_runs_or_pulls_says_so() -> None:
     assert any("no finished run" in text.get_text() for text in plot_trade(table()).texts)
     figure = plot_trade(table(row(end_force=None, end_force_part=None)))
     assert [ax.get_label() for ax in figure.axes] == ["score", "position"]
+
+
+def test_errors_do_not_hang_on_where_the_scene_lies(tmp_path: Path) -> None:
+    """Map coordinates were kept in single precision: half a metre apart."""
+    store = runs.RunStore(tmp_path, None, 1, lambda: False)
+    values = {"position": np.full((1, 1, 3), 6e6) + 1e-3}
+    _, kept = store.save(Row("hybrid", "rod", "1%", "done", key="x"), values)
+    assert np.array_equal(kept["position"], values["position"])
+    assert np.array_equal(store.load("x")[1]["position"], values["position"])
+
+
+def test_an_error_of_forces_where_no_end_is_held_is_refused(tmp_path: Path) -> None:
+    """The cheapest run was recommended, by no comparison at all."""
+    section = {"length": 10, "mass": 1.5, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 50}
+    points = {"kind": "points", "points": [[0, 0, 0], [5, 0, 0.5], [9.93, 0, 0]]}
+    scene = cable_scene(section, {"kind": "free"}, {"kind": "free"}, initial=points, time=0.2, output=(0.1, 5))
+    with pytest.raises(SceneError, match="an error of position"):
+        hybrid.trade(scene, tmp_path, models=["rod"], accuracies=["10%"], target="50 N")

@@ -27,7 +27,7 @@ from hybrid.simulation.run_zones import RunZones
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.manager import Allowed, DomainManager, Times, shares_asked
 from tests.inside import calls_of, never_due
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -377,3 +377,18 @@ def test_zones_of_an_older_checkpoint() -> None:
         zoning_of_today({"manager": {x: x for x in names}})["manager"].items()
         >= {y: x for x, y in names.items()}.items()
     )
+
+
+def test_new_cells_beside_a_clamp_leave_along_it() -> None:
+    """An output at a change of cells shows the pull that the step has ended with: 54 % of the largest was between."""
+    section = {"length": 60, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": 30.0,
+               "drag": {"normal": 1.2}}  # fmt: skip
+    heave = {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4}
+    found = hybrid.run(cable_scene(
+        section, pinned_at(0, 0, -22), clamped_at([38, 0, 0], [0.5, 0, 1], motion=heave), fluid={"density": 1025},
+        seabed={"z": -22, "stiffness": 3e3, "damping": 200}, model={"kind": "adaptive", "curvature_error": 0.03},
+        dimension=2, mesh=40, time=(3.2, 0.05), output=(0.05, 21)
+    ))  # fmt: skip
+    shown = np.linalg.norm(found["reaction_end"], axis=1)[1:]
+    ended = np.interp(found.times[1:], found["steps/t"], found["steps/end_force_end"])
+    assert np.abs(shown - ended).max() < 0.1 * ended.max()

@@ -392,7 +392,10 @@ def begin_switch(table):
     for c in range(line.h.shape[0]):
         line.h[c] = job.zones.lengths[c]
     job.numbers[BEFORE] = energy(line, job.sea, job.ends, transfer.state, job.zones)
-    transfer_state(transfer)
+    for k in range(2):
+        for j in range(3):
+            transfer.clamps[k, 1, j] = job.ends.frame[k, 2 + 3 * j]
+    transfer_state(transfer, job.guided)
     if transfer.target.bits & PLANAR:
         untwist(transfer.target, job.ends, job.guided, transfer.out)
 

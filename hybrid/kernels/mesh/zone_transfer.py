@@ -319,6 +319,23 @@ def keep_momentum(job):
         shift(out.v, scale(1.0 / inside, missing), 1, m)
 
 
+@inner
+def bend_to_clamps(job, guided):
+    """New nodes in the cells at ends that hold the tangent: on cubics that leave along it."""
+    line, target, match, out, r = job.line, job.target, job.match, job.out, job.state.r
+    n = line.h.shape[0]
+    for i in range(target.s.shape[0]):
+        c = match.left[i]
+        for k in range(2):
+            if match.same[i] < 0 and guided[k] > 0.0 and c == k * (n - 1):
+                found = slope(r, line.s, match.single, k * n, c, True)
+                t = job.clamps[k, 1]
+                by = sub(scale(math.sqrt(dot(found, found)), (t[0], t[1], t[2])), found)
+                H, q = line.s[c + 1] - line.s[c], (target.s[i] - line.s[c]) / (line.s[c + 1] - line.s[c])
+                weight = H * q * q * (q - 1.0) if k else H * q * (1.0 - q) ** 2
+                put3(out.r, i, add(get3(out.r, i), scale(weight, by)))
+
+
 # --- frames ---------------------------------------------------------------------------------------
 
 
@@ -469,11 +486,13 @@ def carry_frames(job):
 
 
 @inner
-def transfer_state(job):
+def transfer_state(job, guided):
     line, target, state, out, match = job.line, job.target, job.state, job.out, job.match
     find_match(job)
     third = not job.shifts[0]  # where cells follow the curvature, and are what it is known by
     carry_nodes(state.r, out.r, line.s, target.s, match, third)
+    if third:
+        bend_to_clamps(job, guided)
     carry_nodes(state.v, out.v, line.s, target.s, match, third)
     carry_nodes(state.a, out.a, line.s, target.s, match, third)
     carry_nodes(state.vd, out.vd, line.s, target.s, match, third)
@@ -496,7 +515,8 @@ def transfer_state(job):
 @kernel
 def transfer(table):
     """Carry the state of a Transfer to its new cells."""
-    transfer_state(read(table))
+    job = read(table)
+    transfer_state(job, job.held)
 
 
 @kernel
