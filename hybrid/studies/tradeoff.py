@@ -74,8 +74,7 @@ def trade(
     command: for the heading of the page.
 
     Raises SceneError when the scene or an argument is refused, ResultError when the folder cannot be written to,
-    ComputationError when the reference fails.
-    KeyboardInterrupt leaves a table of the finished runs.
+    ComputationError when the reference fails.  KeyboardInterrupt leaves a table of the finished runs.
     """
     target, progress = _renamed(former, target, progress)
     tables = as_scene(scene)
@@ -99,8 +98,7 @@ def trade(
         limits: list[tuple[float | None, float | None]] = [(None, None)]
         largest, lengths = _largest_end_force(reference_values), _lengths(tables)
         if not largest and wanted.position is None:
-            expected = "an error of position, because no end is held and no force compared"
-            raise SceneError([Complaint("for", target, expected, '--for "3 cm"')])
+            raise SceneError([Complaint("for", target, "an error of position: no end is held", '--for "3 cm"')])
         try:
             check = _compared(store, run_spec(tables, rod, _coarser(goal)), reference_values, lengths)
             rows.append(replace(check, status=CHECK) if check.status != FAILED else check)
