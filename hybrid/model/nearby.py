@@ -456,4 +456,7 @@ def without_clamp(line: Line, node: int) -> Line:
         return line
     element, kb, k0, hn = line.element.copy(), line.kb.copy(), line.k0.copy(), line.hn.copy()
     element[node], kb[node], k0[node], hn[node] = 0, 0.0, 0.0, 0.5 * abs(line.s[node] - line.s[-2 if node else 1])
-    return line._replace(element=element, kb=kb, k0=k0, hn=hn)
+    slip_law = line.slip_law.copy()  # as wide as it was
+    if slip_law.size:
+        slip_law[node] = 0.0
+    return line._replace(element=element, kb=kb, k0=k0, hn=hn, slip_law=slip_law)
