@@ -88,6 +88,8 @@ def refused_as_cable(tables: Tables) -> bool:
 # Of the energy of stretch, with soil: Newton's method converges linearly where a node turns from one branch of it to the
 # other, to its tolerance and not far below. Over steps that is 7e-9 of the length, as little as positions may differ by.
 IN_SOIL = 5e-6
+# Of the length, at rest against friction, which converges linearly, too: on one kind of processor 2.1e-9, on others less.
+RUBS = 5e-9
 # m, where cells to a layer are placed by a coarse run: what that is computed otherwise by moves nodes.
 BY_CELLS = 1e-4
 
@@ -129,12 +131,34 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables]) -> str:
     apart = np.abs(two.position - there).max(axis=(1, 2)) / LENGTH
     energy = np.abs(two["energy/stretch"] - one["energy/stretch"]).max() / one["energy/stretch"].max()
     placed = "layers" in names
-    rest = BY_CELLS / LENGTH if placed else 1e-9
+    rest = BY_CELLS / LENGTH if placed else RUBS if {"seabed", "soil"} & {*names} else 1e-9
     allowed = (BY_CELLS if placed else 20.0 * TOLERANCE * LENGTH) / LENGTH
     loose, in_soil = placed or "torque of tension" in names, "soil" in names
     stretch = 1e-4 if loose else IN_SOIL if in_soil else 1e-6
-    good = apart[0] < rest and apart.max() < allowed and energy < stretch
-    return "" if good else f"{names}: {apart[0]:.2g}, {apart.max():.2g} of the length, {energy:.2g} of the energy"
+    shown = max(apart_by(one, two, name, said is turned) for name in SHOWN)
+    good = (
+        apart[0] < rest
+        and apart.max() < allowed
+        and energy < stretch
+        and shown < (1e-2 if placed else 3e-3 if loose else 2e-5)
+    )
+    far = f"{apart[0]:.2g}, {apart.max():.2g} of the length, {energy:.2g} of the energy, {shown:.2g} of what is shown"
+    return "" if good else f"{names}: {far}"
+
+
+# What a file has of moments and extremes, which no turned axes change.
+SHOWN = (
+    "bending_moment",
+    *(f"envelope/{x}" for x in ("tension_max", "tension_min", "bending_moment_max", "contact_max")),
+)
+
+
+def apart_by(one: hybrid.Result, two: hybrid.Result, name: str, exchanged: bool) -> float:
+    """The largest difference of a field, as a part of its largest size; 0 where one has none."""
+    if name not in one.names or name not in two.names:
+        return 0.0
+    a, b = one[name], two[name]
+    return float(np.abs((a[..., ::-1] if exchanged else a) - b).max() / max(np.abs(a).max(), 1e-9))
 
 
 def differences(names: Iterable[tuple[str, ...]], ways: Sequence[Callable[[Tables], Tables]]) -> list[str]:
@@ -149,5 +173,5 @@ def test_a_feature_computed_otherwise_is_the_same() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_a_pair_computed_otherwise_is_the_same(part: int) -> None:
-    """All pairs that are not refused: the motion, at rest to 1e-9 of the length, and the energy of its stretch."""
+    """All pairs that are not refused: motion, at rest to 1e-9 of the length (RUBS), energy, moments and extremes."""
     assert not differences([*pairs()][part::4], (turned,))
