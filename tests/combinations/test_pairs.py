@@ -140,7 +140,7 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables]) -> str:
         apart[0] < rest
         and apart.max() < allowed
         and energy < stretch
-        and shown < (1e-2 if placed else 3e-3 if loose else 2e-5)
+        and shown < (5e-2 if placed else 3e-3 if loose else 2e-5)
     )
     far = f"{apart[0]:.2g}, {apart.max():.2g} of the length, {energy:.2g} of the energy, {shown:.2g} of what is shown"
     return "" if good else f"{names}: {far}"
