@@ -291,7 +291,7 @@ class LineResponse:
             (deviation >= OF_LARGEST * deviation.max()) & (self.left_out.get(name, 0.0) <= ADDED.get(name, np.inf))
         )
 
-    def _of_size(self) -> LineSpectrum:
+    def _curvature_power(self) -> LineSpectrum:
         """Power (F, N+1) of curvature by where the bend points: of any axes across the line the same."""
         x, points = np.stack([self.curvature, self.curvature_across], axis=2), self.covariance
         points[:, 0, 0] += self.mean_curvature**2
@@ -299,7 +299,7 @@ class LineResponse:
 
     def period(self, name: str) -> Floats:
         """Mean period between up-crossings, s."""
-        spectrum = self._of_size() if name == "curvature" else self.spectrum(name)
+        spectrum = self._curvature_power() if name == "curvature" else self.spectrum(name)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.sqrt(spectrum.moment(0) / spectrum.moment(2)))
 

@@ -476,7 +476,7 @@ WINCH = {"payout": "write it where a line ends: `lines: {NAME: {connections: {en
 FORBIDDEN = "/."
 
 
-def _as_it_is(name: Any) -> Any:
+def _without_blanks(name: Any) -> Any:
     """A name that has no blanks around it: without them it might be another one."""
     if isinstance(name, str) and name != name.strip():
         raise ValueError("a name")
@@ -489,7 +489,7 @@ def _a_name(name: str) -> str:
     return name
 
 
-Name = Annotated[Text, Before(_as_it_is), After(_a_name)]
+Name = Annotated[Text, Before(_without_blanks), After(_a_name)]
 
 
 class FixedPoint(Table):

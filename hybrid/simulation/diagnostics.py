@@ -100,7 +100,7 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED: tuple[str, ...] = ("_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off")
 REMEMBERED += ("_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink", "_weight", "_lay")
-REMEMBERED += ("_knot", "_bent", "_negative", "_unbent")
+REMEMBERED += ("_knot", "_bent", "_negative", "_first_bend")
 
 
 class LineStep(NamedTuple):
@@ -123,7 +123,7 @@ class Diagnostics:
         self._fold, self._twist, self._slack = self._bend, UNRESOLVED, model.slack_floor
         self._sunk = SUNK * model.length
         self._within, self._round, self._between = 1.0, False, False
-        self._unbent = np.inf  # s, until when no bend has been told: outputs come after steps that are later
+        self._first_bend = np.inf  # s, when a bend was told first: outputs are looked at after later steps
         self._off = OFF * model.length
         self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
@@ -287,7 +287,7 @@ class Diagnostics:
                 "unresolved bend",
                 self._bend_text(node, bend, state.T),
             )
-            self._bend, self._unbent = 1.5 * bend, min(self._unbent, t)
+            self._bend, self._first_bend = 1.5 * bend, min(self._first_bend, t)
         if twist > self._twist:
             text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
             self.note(t, twisted, "unresolved twist", text)
@@ -431,7 +431,7 @@ class Diagnostics:
             kinked = kinks_at(joints, seen.bends, line.hn)[:, 0] > self._kink
             found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
         layers = bool(model.attached) | seen.has_element(0) | seen.has_element(1)
-        found |= layers & (seen.batch.t < self._unbent)
+        found |= layers & (seen.batch.t < self._first_bend)
         if not self._weight:
             nodes, _, limits = too_long_for_weight(model.cable, line)
             if nodes.size:
@@ -633,7 +633,7 @@ class Diagnostics:
     def _layers(self, batch: Batch) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
         line, last = self._model.line, self._model.line.h.size
-        if batch.t[0] >= self._unbent or not line.element.any():
+        if batch.t[0] >= self._first_bend or not line.element.any():
             return
         d = batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
         tangents = batch.frame[:, :, 2::3]
@@ -645,7 +645,7 @@ class Diagnostics:
             if not line.element[node] or not beside:
                 continue
             cell, stiffness = min(node, last - 1), batch.stiffness(node, line)[:, :2].max(axis=1) * line.hn[node]
-            thin = (batch.T[:, cell] * line.h[cell] ** 2 > stiffness) & (batch.t < self._unbent)
+            thin = (batch.T[:, cell] * line.h[cell] ** 2 > stiffness) & (batch.t < self._first_bend)
             angle = np.linalg.norm(after - before, axis=1) - float(np.linalg.norm(line.k0[node, :2]))
             smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / line.hn[i] for i in beside], axis=0)
             bad = np.flatnonzero(thin & (angle > ASKEW) & (smooth < LAYER * angle / line.hn[node]))
@@ -653,7 +653,7 @@ class Diagnostics:
         if found:
             k, node, bend = min(found)
             self.note(float(batch.t[k]), node, "unresolved bend", self._bend_text(node, bend, batch.T[k]))
-            self._unbent = float(batch.t[k])
+            self._first_bend = float(batch.t[k])
 
     def _bends_by_weight(self, seen: Observation) -> None:
         """Bends of a rod almost without tension that are shorter than its cells."""

@@ -82,7 +82,7 @@ class Rows:
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
         self._happened: Counter[str] = Counter()  # events by kind
-        self.checked = 0  # rows of events that the last checkpoint keeps
+        self.kept_events = 0  # rows of events that the last checkpoint keeps
         self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow, that are not written yet
         self.closed = False
 
@@ -110,7 +110,7 @@ class Rows:
 
     def sort_events(self) -> None:
         """Put events that wait in the order of their times: outputs tell later than steps do."""
-        self._events.sort(self.checked)
+        self._events.sort(self.kept_events)
 
     def close(self, status: str = "complete", message: str = "") -> None:
         """End the result with a status of STATUS and a message; a second call does nothing."""

@@ -415,7 +415,7 @@ class Recorder(Rows):
         every = self._every()
         rows = {name: {x.scale: x.count + x.waiting for x in each._all if x.fields} for name, each in every.items()}
         for each in every.values():
-            each.checked = each._events.count + each._events.waiting
+            each.kept_events = each._events.count + each._events.waiting
         happened = of_all({name: each._happened for name, each in every.items()})
         here = {"number": self._number, "t": self.last, "files": self.files, "rows": of_all(rows)}
         tree = {**here, "happened": happened, "zones": self._zones or [], **content()}

@@ -156,10 +156,12 @@ def test_contact_is_named() -> None:
     (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
     data = made.scene.model_dump(mode="json", exclude_none=True)
     scenes = [hybrid.validate_scene(data | {"contact": {"self": x}}) for x in (True, False)]
-    assert [any("contact is left out" in x for x in deck_of(Straight(scene)).notes) for scene in scenes] == [
-        True,
-        False,
-    ]
+    section = {"length": 30, "mass": 9, "diameter": 0.1, "axial_stiffness": 1e7}
+    lines = {x: line_between("a", "b", section, mesh=9, model="catenary") for x in "lm"}
+    ends = {"a": {"position": [0, 0, -20]}, "b": {"position": [20, 0, 0]}}
+    scenes += [hybrid.validate_scene(network_scene(ends, lines, contact=x)) for x in ({}, {"between": []})]
+    said = [any("contact is left out" in x for x in deck_of(Straight(scene)).notes) for scene in scenes]
+    assert said == [True, False, True, False]
 
 
 def test_lift_of_vortices_is_named() -> None:

@@ -183,9 +183,8 @@ class _Writer:
             self.notes.append("environment.fluid.current is left out: MoorDyn reads currents from other files")
         if fluid is not None and fluid.waves is not None:
             self.notes.append("environment.fluid.waves is left out: MoorDyn reads waves from other files")
-        if self.scene.contact is not None or any(
-            x.contact is not None and x.contact.self for x in self.scene.lines.values()
-        ):
+        touching, lines = self.scene.contact, self.scene.lines.values()
+        if (touching is not None and touching.between != ()) or any(x.contact and x.contact.self for x in lines):
             self.notes.append("contact is left out: lines of the deck pass through themselves and each other")
         if bed is not None and bed.depths is not None:
             expected = (
