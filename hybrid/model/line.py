@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.axial_law import SHIFT
-from hybrid.kernels.laws.bending_law import (
-    EACH,
-    ENERGY,
-    FIRST_A,
-    FIRST_B,
-    GIVE,
-    HALF_A,
-    HALF_B,
-    LAST_A,
-    LAST_B,
-)
+from hybrid.kernels.laws.bending_law import EACH, ENERGY
 from hybrid.kernels.laws.element import NO_SPRING
-from hybrid.kernels.laws.water import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
-from hybrid.kernels.mesh.remesh import OF_POINTS, PER_LENGTH, Cable, blank_line_job, fill_line
+from hybrid.kernels.mesh.remesh import OF_POINTS, PER_LENGTH, Cable, blank_cable, blank_line_job, fill_line
 from hybrid.kernels.state.report import (
     AXIAL_LAW,
     BENDING_LAW,
@@ -35,14 +26,15 @@ from hybrid.kernels.state.report import (
     STIFFNESS_DAMPING,
 )
 from hybrid.kernels.state.state import (
-    NO_BEND_LAW,
+    FIELDS,
     NO_LAW,
+    NO_MOVED,
     NO_PLANE,
     NO_TORSION,
-    NO_WAKE_LAW,
     TENSION_TORQUE,
     Floats,
     Line,
+    blank,
     blank_line,
 )
 from hybrid.model.material import Material, elastic_layer, nodes_at
@@ -51,7 +43,29 @@ from hybrid.scene.section_laws import Curve, Layer, slopes
 # What inertia the sections of rods have.
 NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
 
-lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
+# Of a line, what is not of its nodes and cells.
+OF_ALL = ("bits", "plane", "torsion", "law_table", "bend_table", "moved")
+
+
+@cache
+def lines_with(*names: str) -> Packed:
+    """What makes lines of any number of cells that have optional fields of these names."""
+
+    def one(n: int) -> Line:
+        more: dict[str, Any] = {name: blank(FIELDS[name]._replace(optional=False), n) for name in names}
+        return blank_line(n)._replace(**more)
+
+    return Packed(one, given=OF_ALL)
+
+
+def lines_like(line: Line) -> Packed:
+    """What makes lines with the optional fields of this one, which has no layers that slip."""
+    return lines_with(*(name for name, field in FIELDS.items() if field.optional and getattr(line, name).size))
+
+
+def of_all(line: Line) -> dict[str, Any]:
+    """What `lines_like` is given."""
+    return {name: getattr(line, name) for name in OF_ALL}
 
 
 def line_on(
@@ -81,33 +95,31 @@ Cells = tuple[NDArray[np.int64], np.ndarray]
 
 
 def on_base(
-    material: Material, cable: Cable, s: Floats, cells: Cells, bits: int, job: Table, plane: Floats = NO_PLANE
+    material: Material,
+    cable: Cable,
+    s: Floats,
+    cells: Cells,
+    bits: int,
+    job: Table,
+    plane: Floats = NO_PLANE,
+    moved: NDArray[np.int8] = NO_MOVED,
 ) -> Line:
     """The line of a material with nodes s (N+1,) m on base cells.
 
     cable: that on these; cells: (N,) base cells of its cells, and whether they are rod; job: a table of
-    kernels.mesh.remesh.LineJob.
+    kernels.mesh.remesh.LineJob; moved: as of `Line`.
     """
     of_cell, rod = cells
     h, of = np.diff(s), material.piece(0.5 * (s[:-1] + s[1:]))
-    torque, twist = material.torque_by_tension(h, of)
+    has = {"law": cable.law, "bend_law": cable.bend, "wake_law": cable.wake}
+    has |= dict.fromkeys(TENSION_TORQUE, cable.torque)
+    names = [name for name, x in has.items() if x.size] + ["bed_width"] * bool(bits & SOIL)
     torsion = torsion_zones(material, h, rod, of)
-    line: Line = lines(h.size, bits=bits, plane=plane, torsion=torsion, tension_torque=torque, tension_twist=twist)
+    shared = {"torsion": torsion, "moved": moved, "law_table": cable.law_table, "bend_table": cable.bend_table}
+    line: Line = lines_with(*names)(h.size, bits=bits, plane=plane, **shared)
     job.bind(cable=cable, nodes=s, base_of_cell=of_cell, rod=rod, line=line)
     fill_line(job.numbers)
-    if material.curves is not None:
-        law, law_table = axial_law(material, h, of)
-        line = line._replace(law=law, law_table=law_table)
-    if material.bends is not None:
-        bent, table = bend_law(material, line, of)
-        line = line._replace(bend_law=bent, bend_table=table)
-    if bits & BENDING_SLIP:
-        line = with_slip(line, material, of)
-    if material.vortices.size:
-        line = line._replace(wake_law=wake_law(material, s, of))
-    if bits & SOIL:
-        line = line._replace(bed_width=bed_width(material, h, of))
-    return line
+    return with_slip(line, material, of) if bits & BENDING_SLIP else line
 
 
 def made_of(material: Material, inertia: int = WITH_SECTIONS) -> Floats:
@@ -125,12 +137,28 @@ def cable_on(material: Material, base: Floats, bits: int, inertia: int) -> Cable
     of, place = material.piece(0.5 * (base[:-1] + base[1:])), nodes_at(material.at, base)
     load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
     load[place], turns[nodes_at(material.swivels, base)] = 1, 1
-    points = np.zeros((len(OF_POINTS), base.size))
     held = np.array([material.held_tangent, material.held_twist], np.int8).T.copy()
     made, EI, w = made_of(material, inertia)[of], material.mean_bending[of], np.abs(material.submerged_weight[of])
-    cable = Cable(made, EI, w, points, np.zeros(len(points)), load, turns, held, np.array(material.springs))
+    cable = blank_cable(of.size)._replace(
+        made=made, EI=EI, w=w, load=load, turns=turns, held=held, springs=np.array(material.springs)
+    )
+    cable = cable._replace(width=material.outer_diameter[of], **laws_on(material, of))
     put_points(material, place, cable, bits)
     return cable
+
+
+def laws_on(material: Material, of: NDArray[np.int64]) -> dict[str, Any]:
+    """What a `Cable` has, on base cells of pieces `of` (n,), of laws that only some materials have."""
+    found: dict[str, Any] = {}
+    if material.curves is not None:
+        found |= axial_law(material, of)
+    if material.bends is not None:
+        found |= bend_law(material, of)
+    if material.tension_torque.size:
+        found["torque"] = material.tension_torque[of]
+    if material.vortices.size:
+        found["wake"] = np.column_stack([material.vortices[of], np.full(of.size, material.around)])
+    return found
 
 
 def put_points(material: Material, place: np.ndarray, cable: Cable, bits: int) -> None:
@@ -192,31 +220,9 @@ def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
     return np.array(rows, float).reshape(-1, 5)
 
 
-def bed_width(material: Material, h: Floats, of: np.ndarray) -> Floats:
-    """`bed_width` (N+1,) m of a line with cells of lengths h (N,) m on pieces `of` (N,): means."""
-    D, before, after = material.outer_diameter[of], np.concatenate([[0.0], h]), np.concatenate([h, [0.0]])
-    one, other = np.concatenate([D[:1], D]), np.concatenate([D, D[-1:]])
-    return np.asarray(one + after / (before + after) * (other - one))
-
-
-def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:
-    """`wake_law` of a line with nodes s (N+1,) m and cells on pieces `of` (N,); phases begin once round along it."""
-    row, half = material.vortices[of], 0.5 * np.diff(s)
-    out = np.zeros((s.size, NO_WAKE_LAW.shape[1]))
-    out[1:, LIFT_A], out[:-1, LIFT_B] = half * row[:, 0], half * row[:, 0]
-    sheds = (row[:, 1] > 0.0).astype(float)
-    of_node = np.zeros((s.size, 5))
-    for sides in (slice(1, None), slice(None, -1)):
-        of_node[sides] += row[:, 1:]
-    count = np.concatenate([[0.0], sheds]) + np.concatenate([sheds, [0.0]])
-    out[:, DIAMETER : RAMP + 1] = of_node / np.maximum(count, 1.0)[:, None]
-    out[:, OFFSET] = 2.0 * np.pi * s / material.around
-    return out
-
-
-def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Floats]:
-    """`law` and `law_table` of a line with cells of lengths h (N,) m on pieces `of` (N,)."""
-    law, rows, begin = np.zeros((h.size, NO_LAW.shape[1])), [], 0
+def axial_law(material: Material, of: NDArray[np.int64]) -> dict[str, Floats]:
+    """`law` and `law_table` of a `Cable` on base cells of pieces `of` (n,)."""
+    law, rows, begin = np.zeros((of.size, NO_LAW.shape[1])), [], 0
     for k, piece in enumerate(material.curves or ()):
         cells = of == k
         if piece is None or not cells.any():
@@ -224,7 +230,7 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
         rows.append(_with_energy(piece.rows))
         law[cells, :SHIFT] = (begin, begin + len(piece.rows), *piece.dynamic, *piece.working, *piece.creep)
         begin += len(piece.rows)
-    return law, np.concatenate(rows)
+    return {"law": law, "law_table": np.concatenate(rows)}
 
 
 # Layers that slip on each other as a line bends: of the elements of a line on its cells.
@@ -272,33 +278,18 @@ def _of_table(material: Material, piece: int) -> list[Layer]:
     return [elastic_layer(x, float(K)) for (x, _), K in zip(table[1:-1], more, strict=True) if K != 0.0]
 
 
-# Tables of moment over curvature: of sections, of what stiffens them, and of the elements of a line on its cells.
+# Tables of moment over curvature: of sections, and of what stiffens them.
 
 
-def bend_law(material: Material, line: Line, of: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """`bend_law` and `bend_table` of a line whose cells are of pieces `of` (N,) of a material."""
+def bend_law(material: Material, of: NDArray[np.int64]) -> dict[str, Any]:
+    """`bend`, `mixed` and `bend_table` of a `Cable` on base cells of pieces `of` (n,)."""
     known: dict[Curve, int] = {}
     number = np.array([known.setdefault(x, len(known)) for x in _each_piece(material)])[of]
     begins = np.cumsum([0, *map(len, known)])
-    n, half = line.h.size, 0.5 * line.h
-    law = np.zeros((n + 1, NO_BEND_LAW.shape[1]))
-    for cells, first, last, length, nodes in (
-        (number, FIRST_A, LAST_A, HALF_A, slice(1, n + 1)),
-        (number, FIRST_B, LAST_B, HALF_B, slice(0, n)),
-    ):
-        law[nodes, first], law[nodes, last], law[nodes, length] = begins[cells], begins[cells + 1], half
-    same = np.concatenate([[False], number[1:] == number[:-1], [False]])
-    law[same, HALF_A] += law[same, HALF_B]
-    law[same, FIRST_B : HALF_B + 1] = 0.0
     plain = np.array([x is None for x in material.bends or ()])[of]
-    without = np.concatenate([[True], plain]) & np.concatenate([plain, [True]])
-    mixed = np.array([False, *(material.meet(a, b) for a, b in pairwise(of)), False])
-    law[without | mixed | (line.element == 0)] = 0.0
-    for k, spring in enumerate(material.springs):
-        if law[-k, LAST_A] + law[-k, LAST_B] > 0.0 and spring < np.inf:
-            stiffness = float(material.B[of[-k], :2].mean()) / half[-k]
-            law[-k, GIVE] = 1.0 / max(spring, NO_SPRING * stiffness)
-    return law, np.concatenate([_with_energy(x) for x in known])
+    bend = np.column_stack([begins[number], begins[number + 1], plain]).astype(float)
+    mixed = np.array([False, *(material.meet(a, b) for a, b in pairwise(of)), False], np.int8)
+    return {"bend": bend, "mixed": mixed, "bend_table": np.concatenate([_with_energy(x) for x in known])}
 
 
 def _each_piece(material: Material) -> list[Curve]:

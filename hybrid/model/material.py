@@ -120,16 +120,6 @@ class Material:
         """Whether both ends hold the twist, and nothing between them lets it go."""
         return all(self.held_twist) and all(self.held_tangent) and not self.swivels.size
 
-    def torque_by_tension(self, h: Floats, of: np.ndarray) -> tuple[Floats, Floats]:
-        """Of cells h (N,) m of the pieces `of`: torque by tension, N m per N, and twist of half a cell by it, rad/N.
-
-        Empty where tension makes no torque anywhere.
-        """
-        if not self.tension_torque.size:
-            return np.zeros(0), np.zeros(0)
-        c = self.tension_torque[of]
-        return c, np.where(c != 0.0, 0.5 * h * c / np.where(c != 0.0, self.B[of, 2], 1.0), 0.0)
-
     @property
     def mean_bending(self) -> Floats:
         """(K,) N m2, mean EI of both axes, of a table its steepest, of layers while they stick.

@@ -384,8 +384,7 @@ class LineOnBase:
             put_points(self._material, self._place, self._cable, bits)
             self._bits = bits
         cells = layout.base_of_cell, layout.rod_cells
-        line = on_base(self._material, self._cable, layout.nodes, cells, bits, self._line_job, plane)
-        return line._replace(moved=moved)
+        return on_base(self._material, self._cable, layout.nodes, cells, bits, self._line_job, plane, moved)
 
     def kinds(self, layout: Layout, free: np.ndarray, scale: float) -> NodeKinds:
         """What criteria know of the nodes of a layout; free: (n,) of base cells; scale: tension scale, N."""

@@ -44,9 +44,8 @@ MOST_PLACES = 20_000  # nodes of lines whose outputs may wait, in all
 def carries_all(model: Model, switching: ZoneSwitching) -> bool:
     """Whether kinds of a line can change in compiled code: nothing that they would carry is left out there."""
     line = model.line
-    laws = line.torsion, line.tension_twist, line.law, line.bend_law, line.wake_law, line.moved
-    bare = switching.compiled and model.payout is None and not any(x.size for x in laws)
-    return bare and bool(line.bits & PLANAR or not switching.zones.counts.holds_twist)
+    turns = bool(line.torsion.size) or (switching.zones.counts.holds_twist and not line.bits & PLANAR)
+    return switching.compiled and model.payout is None and not turns
 
 
 class Cells(NamedTuple):

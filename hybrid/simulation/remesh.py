@@ -24,31 +24,20 @@ from hybrid.kernels.run.network import begin_line
 from hybrid.kernels.run.newton import NO_PUSH
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.report import REMEMBERS, SOIL
 from hybrid.kernels.state.state import (
-    NO_GRIP,
-    NO_PEAK,
-    NO_SHEAVES,
-    NO_SLOW,
-    NO_SOIL,
-    NO_TENSION_TORQUE,
-    NO_TORSION,
     NO_TURN,
-    NO_WAKE,
-    TENSION_TORQUE,
     Batch,
     Floats,
     Line,
     Sea,
     State,
     Work,
-    blank_line,
-    blank_state,
+    memory_of,
     no_sea,
 )
 from hybrid.kernels.step.line_step import RUN, Task, blank_job
 from hybrid.model.build import Model
-from hybrid.model.line import lines
+from hybrid.model.line import OF_ALL, lines_like, of_all
 from hybrid.model.network import NetworkModel
 from hybrid.outputs.observation import Output
 from hybrid.simulation.lines_contact import LinesWatch
@@ -57,7 +46,7 @@ from hybrid.solve.contact import SelfContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import HEAVY, NetworkState
-from hybrid.zones.change import states
+from hybrid.zones.change import states_with
 
 if TYPE_CHECKING:
     from hybrid.simulation.payout import PayingOut
@@ -133,18 +122,11 @@ def watch_beside(line: OfLine) -> LinesWatch | None:
     return line.watched_by if line.watched_by is not None and line.watched_by.is_needed else None
 
 
-# What a line that changes so has not, of its fields and of those of its state: `Remesh` is not asked for one that has.
-NO_LAWS: dict[str, Floats] = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
-NO_MEMORY: dict[str, Floats] = {"turn": NO_TURN, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK}
-NO_MEMORY |= {"grip": NO_GRIP, "sheave": NO_SHEAVES}
-states_in_soil = Packed(partial(blank_state, soil=True), given=[*NO_MEMORY])
-lines_in_soil = Packed(lambda n: blank_line(n)._replace(bed_width=np.zeros(n + 1)), given=("bits", "plane", *NO_LAWS))
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ITSELF = ("line", "old", "new", "itself")
-OF_SEA = ("flow", "axis", "slip", "slid", "bed")  # what it has of nodes
+OF_SEA = ("flow", "axis", "slip", "slid", "bed", "grip", "rolling")  # what it has of nodes
 REST_OF_SEA = tuple(name for name in Sea._fields if name not in OF_SEA)
-seas = Packed(no_sea, given=REST_OF_SEA)
 
 
 # Of `Books`, what does not depend on the cells, or is samples.
@@ -166,6 +148,17 @@ def blank_kept(n: int, extra: int) -> Books:
 
 
 of_pushes = Packed(lambda n: Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4))))
+
+
+@cache
+def seas_with(grip: int, rolling: int) -> Packed:
+    """What makes the surroundings of lines of any number of cells; columns of `Sea.grip`, and rows of `Sea.rolling`."""
+
+    def one(n: int) -> Sea:
+        sea = no_sea(n)
+        return sea._replace(grip=np.zeros((n + 1, grip)), rolling=np.zeros((rolling, n + 1, 5))) if grip else sea
+
+    return Packed(one, given=REST_OF_SEA)
 
 
 @cache
@@ -245,13 +238,12 @@ class Remesh:
         self._limits, self._fixed_to = run.solver.limits_by_itself(number), self._key()
         self.most = most = self.model.most_cells
         kept = kept_of(marked)
-        bits = self.model.line.bits
-        of_lines, of_states = lines_in_soil if bits & SOIL else lines, states_in_soil if bits & REMEMBERS else states
-        self._memory = NO_MEMORY if bits & REMEMBERS else NO_MEMORY | {"soil": NO_SOIL}
+        line, sea = self.model.line, self.model.sea.values
+        of_lines, of_states = lines_like(line), states_with(*memory_of(line))
         self._lines = Room(of_lines, most), Room(of_lines, most)
         self._states = tuple((Room(of_states, most), Room(of_states, most)) for _ in range(2))
         self._pushes, self._kept = (Room(of_pushes, most), Room(of_pushes, most)), (Room(kept, most), Room(kept, most))
-        self._sea = Room(seas, most)
+        self._sea = Room(seas_with(sea.grip.shape[1], len(sea.rolling)), most)
         self._work = Room(Packed(run.solver.room_beside(number, twice), given=("torsion",)), most)
         self._base = np.zeros(self._line.books.base.size, np.int64)
         self._watch_table = self._line.watch_table  # None: nobody watches how near the line comes to itself
@@ -344,12 +336,11 @@ class Remesh:
 
     def line(self, k: int, cells: int) -> Line:
         """The line of side k."""
-        line = self.model.line
-        return self._lines[k].view(cells, bits=line.bits, plane=line.plane, **NO_LAWS)
+        return self._lines[k].view(cells, **of_all(self.model.line))
 
     def state(self, k: int, which: int, cells: int) -> State:
         """The state of side k of even (which = 0) or odd parity (1)."""
-        return self._states[k][which].view(cells, **self._memory)
+        return self._states[k][which].view(cells, turn=NO_TURN)
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
@@ -444,7 +435,7 @@ class Remesh:
             copy_fields(turn.lines[self._number], self.state(0, which, n), ("turn",))
             if pushes[which].size:
                 self._push(0, which, n)[:] = pushes[which]
-        copy_fields(model.line, self.line(0, n), ("bits", "plane", *NO_LAWS))
+        copy_fields(model.line, self.line(0, n), OF_ALL)
         copy_fields(model.sea.values, self._sea_on(n), REST_OF_SEA)
         copy_fields(work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         self._base[:] = books.base

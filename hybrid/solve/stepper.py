@@ -23,6 +23,7 @@ from hybrid.kernels.junctions.joined_lines import SEAT, TURNS
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.seabed import normal_forces, planes_under, soil_at_rest
+from hybrid.kernels.laws.tension_torque import COUPLES
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.run import newton
 from hybrid.kernels.run.newton import block_rows, out_of_balance, workspace_of
@@ -173,9 +174,10 @@ def room_of_line(x: JoinedLine, touches: bool = False) -> Work:
 
 
 def room_of_factors(x: JoinedLine, cells: int, touches: bool) -> dict[str, Any]:
-    """Room for the factors and the first block row of a line in so many cells."""
+    """Room for the factors, the first block row and the torques of tension of a line in so many cells."""
     kept = (cells + 1) * KEPT if is_answered_again(x) else KEPT if x.joints[1] >= 0 else 0
     if touches or x.line.torsion.size:  # these take all factors, which are kept in every march where they serve again
         kept = (cells + 1) * KEPT
     rows = np.zeros((1 if x.joints[0] >= 0 else 0, SIZE * WIDTH))
-    return {"X": np.zeros((cells + 1) * ROW + kept), "rows": rows}
+    couple = np.zeros((cells + 1 if x.line.tension_twist.size else 0, COUPLES))
+    return {"X": np.zeros((cells + 1) * ROW + kept), "rows": rows, "couple": couple}

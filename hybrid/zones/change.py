@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -25,7 +26,7 @@ from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, plan_nodes, read_arcs
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state.report import PLANAR
-from hybrid.kernels.state.state import NO_WAKE, Ends, Floats, Line, Sea, State, blank_state
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, memory_of
 from hybrid.model.build import Model, given_zones
 from hybrid.model.material import nodes_at
 from hybrid.model.mesh import Layout, edges, on_other_parts
@@ -58,7 +59,13 @@ def on_layout(model: Model, layout: Layout) -> Model:
 
 # From the old zones to the new ones: the state on their nodes (kernels.mesh.zone_transfer).
 
-states = Packed(blank_state, given=("turn", "slow", "wake", "peak", "grip", "sheave", "soil"))
+
+@cache
+def states_with(*memory: Any) -> Packed:
+    """What makes states of lines of any number of cells; memory: as of `memory_of`."""
+    return Packed(lambda n: blank_state(n, 0, *memory), given=("turn",))
+
+
 NO_CLAMPS = np.zeros((2, 2, 3)), np.zeros(2, bool)
 
 
@@ -77,16 +84,7 @@ def transfer_to(
     line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
     loads); clamps: as of `ZoneSwitching.clamps`; shifts: whether momentum is kept exactly.
     """
-    out = states(
-        target.h.size,
-        turn=np.zeros((len(target.torsion), 3)),
-        slow=np.zeros(len(target.law)),
-        wake=np.zeros((len(target.wake_law), NO_WAKE.shape[1])),
-        peak=np.zeros(state.peak.size and target.h.size),
-        grip=np.zeros((len(state.grip) and target.h.size + 1, state.grip.shape[1])),
-        sheave=np.zeros(state.sheave.shape),
-        soil=np.zeros((len(state.soil) and target.h.size + 1, state.soil.shape[1])),
-    )
+    out = states_with(*memory_of(target))(target.h.size, turn=np.zeros((len(target.torsion), 3)))
     kept, match = np.array([shifts]), blank_match(line.h.size, target.h.size)
     return Transfer(line, target, state, out, old.places, new.places, old.first, kinks, *clamps, kept, match)
 

@@ -188,9 +188,16 @@ def copy_state(state, out):
         for j in range(3):
             out.r[i, j], out.v[i, j], out.a[i, j] = state.r[i, j], state.v[i, j], state.a[i, j]
             out.vd[i, j], out.slip[i, j], out.bed[i, j] = state.vd[i, j], state.slip[i, j], state.bed[i, j]
-    for i in range(out.soil.shape[0]):
-        for j in range(out.soil.shape[1]):
-            out.soil[i, j] = state.soil[i, j]
+    for one, other in ((state.soil, out.soil), (state.wake, out.wake), (state.grip, out.grip)):
+        for i in range(other.shape[0]):
+            for j in range(other.shape[1]):
+                other[i, j] = one[i, j]
+    for i in range(out.sheave.shape[0]):
+        for j in range(out.sheave.shape[1]):
+            out.sheave[i, j] = state.sheave[i, j]
+    for one, other in ((state.slow, out.slow), (state.peak, out.peak)):
+        for c in range(other.shape[0]):
+            other[c] = one[c]
     for c in range(state.T.shape[0]):
         out.T[c], out.w[c], out.wa[c], out.wd[c] = state.T[c], state.w[c], state.wa[c], state.wd[c]
         for j in range(3):
@@ -234,13 +241,8 @@ def begin_anew(job, state, s, line):
 
 @kernel
 def clear_state(table):
-    """What a change does not carry to the cells of a catenary, and what forces have worked in; widths in soil."""
-    job = read_renew(table)
-    state, width, s, of = job.state, job.line.bed_width, job.to_s, job.of
-    for i in range(width.shape[0]):
-        a, b, n = max(i - 1, 0), min(i, of.shape[0] - 1), of.shape[0]
-        one, after = job.widths[of[a]], s[min(i + 1, n)] - s[i]
-        width[i] = one + after / (s[i] - s[a] + after) * (job.widths[of[b]] - one)
+    """What a change does not carry to the cells of a catenary, and what forces have worked in."""
+    state = read_renew(table).state
     state.a1[:] = 0.0
     state.bed[:] = 0.0
     for c in range(state.T.shape[0]):

@@ -16,6 +16,7 @@ in proportion to length.  A cell that grows at a winch has the means of all that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -24,7 +25,10 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.contact.lines_distance import forget_distances
 from hybrid.kernels.contact.self_distance import boxes_of
-from hybrid.kernels.laws.element import put_spring
+from hybrid.kernels.laws.bending_law import FIRST_A, FIRST_B, GIVE, HALF_A, HALF_B, LAST_A, LAST_B
+from hybrid.kernels.laws.element import NO_SPRING, put_spring
+from hybrid.kernels.laws.water import DIAMETER, LIFT_A, LIFT_B, RAMP
+from hybrid.kernels.laws.water import OFFSET as OF_PLACE
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import NamedNumbers, by_reference, caller, reader, rows
@@ -35,6 +39,7 @@ from hybrid.kernels.state.state import (
     FIELDS,
     HALF,
     MEAN,
+    NO_LAW,
     POINT,
     ROD,
     SHARED,
@@ -387,13 +392,32 @@ class Cable(NamedTuple):
     turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
     held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
     springs: Floats  # (2,) N m/rad, angular springs between held tangents and a rod; infinite: rigid
+    width: Floats  # (n,) m, outer diameter
+    law_table: Rows  # as of `Line`
+    bend_table: Rows
+    law: Rows  # (n, 14) as `Line.law`; empty, as what follows: no cell has one
+    torque: Floats  # (n,) N m per N, torque by tension
+    wake: Rows  # (n, WAKE) of vortices
+    bend: Rows  # (n, BEND) of tables of moment over curvature
+    mixed: NDArray[np.int8]  # (n+1,) 1 where such a table meets two bending stiffnesses: its bends are layers there
+
+
+# Columns of `Cable.wake`: lift per length (kg/m2), what `Line.wake_law` has of nodes, and m, over which phases go once
+# round; of `Cable.bend`: first row of a table and the one behind its last, and whether it is none.
+LIFT = 0
+OF_NODE = 1  # first of five
+AROUND = 6
+WAKE = 7
+TABLE_FIRST, TABLE_LAST, NO_TABLE = range(3)
+BEND = 3
 
 
 def blank_cable(n: int) -> Cable:
     """A cable of nothing on n base cells."""
     z, points = np.zeros, len(OF_POINTS)
     load, turns, held, springs = z(n + 1, np.int8), z(n + 1, np.int8), z((2, 2), np.int8), np.full(2, np.inf)
-    return Cable(z((n, COLUMNS)), z(n), z(n), z((points, n + 1)), z(points), load, turns, held, springs)
+    laws = z((0, 3)), z((0, 3)), z((0, NO_LAW.shape[1])), z(0), z((0, WAKE)), z((0, BEND)), z(n + 1, np.int8)
+    return Cable(z((n, COLUMNS)), z(n), z(n), z((points, n + 1)), z(points), load, turns, held, springs, z(n), *laws)
 
 
 by_reference(blank_cable(1))
@@ -436,6 +460,51 @@ def base_node(of, i):
     return of[i] if i == 0 or of[i] != of[i - 1] else -1
 
 
+@inner
+def fill_laws_of_cell(line, c, cable, j):
+    """Tension over strain, and torque by tension, of cell c on base cell j."""
+    if line.law.shape[0] > 0:
+        for k in range(line.law.shape[1]):
+            line.law[c, k] = cable.law[j, k]
+    if line.tension_torque.shape[0] > 0:
+        x = cable.torque[j]
+        line.tension_torque[c] = x
+        line.tension_twist[c] = 0.5 * line.h[c] * x / cable.made[j, B_1 + 2] if x != 0.0 else 0.0
+
+
+@inner
+def fill_wake(line, i, cable, a, ha, b, hb):
+    """Vortices at node i; arguments: as of `fill_node`, with base cells in place of rows."""
+    law, one, other = line.wake_law, cable.wake[a], cable.wake[b]
+    law[i, LIFT_A], law[i, LIFT_B] = 0.5 * ha * one[LIFT], 0.5 * hb * other[LIFT]
+    count = (ha > 0.0 and one[OF_NODE] > 0.0) + (hb > 0.0 and other[OF_NODE] > 0.0)
+    for k in range(RAMP + 1 - DIAMETER):
+        x = (one[OF_NODE + k] if ha > 0.0 else 0.0) + (other[OF_NODE + k] if hb > 0.0 else 0.0)
+        law[i, DIAMETER + k] = x / max(count, 1)
+    law[i, OF_PLACE] = 2.0 * math.pi * line.s[i] / one[AROUND]
+
+
+@inner
+def fill_bend(line, i, cable, a, ha, b, hb, mixed, spring):
+    """The table of moment over curvature of the element at node i; spring: N m/rad, in series, infinite: none."""
+    law, one, other = line.bend_law, cable.bend[a], cable.bend[b]
+    for k in range(law.shape[1]):
+        law[i, k] = 0.0
+    plain = (ha == 0.0 or one[NO_TABLE] > 0.0) and (hb == 0.0 or other[NO_TABLE] > 0.0)
+    if plain or mixed or not line.element[i]:
+        return
+    if ha > 0.0:
+        law[i, FIRST_A], law[i, LAST_A], law[i, HALF_A] = one[TABLE_FIRST], one[TABLE_LAST], 0.5 * ha
+    if ha > 0.0 and hb > 0.0 and one[TABLE_FIRST] == other[TABLE_FIRST]:
+        law[i, HALF_A] += 0.5 * hb
+    elif hb > 0.0:
+        law[i, FIRST_B], law[i, LAST_B], law[i, HALF_B] = other[TABLE_FIRST], other[TABLE_LAST], 0.5 * hb
+    if spring < np.inf:
+        j, half = (a, 0.5 * ha) if hb == 0.0 else (b, 0.5 * hb)
+        stiffness = 0.5 * (cable.made[j, B_1] + cable.made[j, B_1 + 1]) / half
+        law[i, GIVE] = 1.0 / max(spring, NO_SPRING * stiffness)
+
+
 @kernel
 def fill_line(table):
     """The line of a LineJob."""
@@ -445,6 +514,7 @@ def fill_line(table):
     for c in range(n):
         line.h[c], line.spin[c] = s[c + 1] - s[c], rod[c]
         fill_cell(line, c, made, of[c], line.h[c])
+        fill_laws_of_cell(line, c, cable, of[c])
     for i in range(n + 1):
         b, e, j = max(i - 1, 0), min(i, n - 1), base_node(of, i)
         hb = line.h[b] if i > 0 else 0.0
@@ -463,6 +533,14 @@ def fill_line(table):
             fill_element(line, i, made, of[b], hb, of[e], he, turns)
             if not inside and cable.springs[end] < np.inf:
                 put_spring(cable.springs[end], line, i)
+        if line.bend_law.shape[0] > 0:
+            mixed = j >= 0 and cable.mixed[j]
+            fill_bend(line, i, cable, of[b], hb, of[e], he, mixed, np.inf if inside else cable.springs[end])
+        if line.wake_law.shape[0] > 0:
+            fill_wake(line, i, cable, of[b], hb, of[e], he)
+        if line.bed_width.shape[0] > 0:
+            one = cable.width[of[b]]
+            line.bed_width[i] = one + he / (hb + he) * (cable.width[of[e]] - one)
 
 
 @kernel

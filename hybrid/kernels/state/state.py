@@ -482,9 +482,13 @@ def blank_state(
 
 def state_for(line: Line) -> State:
     """A state of zeros of a line."""
-    free, peak, soil = bool((line.moved == FREE).any()), remembers(line), bool(line.bits & REMEMBERS)
-    slow, wake, layers = line.law.size > 0, line.wake_law.size > 0, slip_size(line) // 2
-    return blank_state(line.h.size, len(line.torsion), slow, wake, line.moved.size, free, peak, layers, soil)
+    return blank_state(line.h.size, len(line.torsion), *memory_of(line))
+
+
+def memory_of(line: Line) -> tuple[bool, bool, int, bool, bool, int, bool]:
+    """What `blank_state` has to know of a line besides its cells and zones."""
+    free, soil, wake = bool((line.moved == FREE).any()), bool(line.bits & REMEMBERS), line.wake_law.size > 0
+    return line.law.size > 0, wake, line.moved.size, free, remembers(line), slip_size(line) // 2, soil
 
 
 def sampled_size(line: Line) -> int:
