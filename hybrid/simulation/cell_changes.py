@@ -41,13 +41,6 @@ LEAST_CELLS = 3  # with which tables are made
 MOST_PLACES = 20_000  # nodes of lines whose outputs may wait, in all
 
 
-def carries_all(model: Model, switching: ZoneSwitching) -> bool:
-    """Whether kinds of a line can change in compiled code: nothing that they would carry is left out there."""
-    line = model.line
-    turns = bool(line.torsion.size) or (switching.zones.counts.holds_twist and not line.bits & PLANAR)
-    return switching.compiled and model.payout is None and not turns
-
-
 class Cells(NamedTuple):
     """A layout, as kernels.mesh.cell_changes.CellPlanner has it."""
 
@@ -94,11 +87,10 @@ class CellChanges(Remesh):
     @staticmethod
     def may_change(run: OfRun, number: int, switching: ZoneSwitching) -> bool:
         """Whether cells of a line can change so in a run whose solver is attached."""
-        paid = any(x.paying is not None for x in run.lines)
-        if paid or not steps_alone(run, number):
-            return False
-        plain = carries_all(run.model.models[number], switching)
-        return plain and switching.manager.layout.rod.size >= LEAST_CELLS
+        paid, line = any(x.paying is not None for x in run.lines), run.model.models[number].line
+        turns = bool(line.torsion.size) or (switching.zones.counts.holds_twist and not line.bits & PLANAR)
+        enough = switching.manager.layout.rod.size >= LEAST_CELLS
+        return enough and not (paid or turns) and steps_alone(run, number)
 
     # --- arrays -------------------------------------------------------------------------------------
 
