@@ -76,7 +76,7 @@ class MoorDynLine:
     def node(self, i: int) -> int:
         """Node of the scene's line for node i from end A."""
         count = abs(self.last - self.first)
-        if isinstance(i, bool) or not (isinstance(i, int) and 0 <= i <= count):
+        if isinstance(i, bool) or not (isinstance(i, int | np.integer) and 0 <= i <= count):
             raise ValueError(f"i: expected a node from 0 to {count}, found {i!r}")
         return self.first + i if self.last >= self.first else self.first - i
 
@@ -438,7 +438,7 @@ def GetLineMaxTen(instance: MoorDynLine) -> float:
 
 def GetFASTtens(instance: MoorDyn, n_lines: int) -> tuple[list[float], ...]:
     """Of each line the horizontal and the vertical tension at end B, then at end A, N."""
-    if isinstance(n_lines, bool) or not isinstance(n_lines, int) or n_lines != len(instance.lines):
+    if isinstance(n_lines, bool) or not isinstance(n_lines, int | np.integer) or n_lines != len(instance.lines):
         raise ValueError(f"n_lines: expected {len(instance.lines)}, found {n_lines!r:.60}")
     out: tuple[list[float], ...] = ([], [], [], [])
     for line in instance.lines:
@@ -455,7 +455,7 @@ def _is_number(x: object) -> bool:
 
 
 def _number(k: int, count: int, name: str) -> int:
-    if isinstance(k, bool) or not (isinstance(k, int) and 1 <= k <= count):
+    if isinstance(k, bool) or not (isinstance(k, int | np.integer) and 1 <= k <= count):
         among = f"a number from 1 to {count}" if count else f"no call, because the deck has no {name}"
         raise ValueError(f"{name}: expected {among}, found {k!r:.60}")
     return k - 1

@@ -247,9 +247,6 @@ def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identifie
     equilibria = Equilibria(scenes, keys, measured.wanted)
     point, found = fit(measured, equilibria, space)
     edges = _at_bounds(space, np.where(space.at_bounds(point.x), 0.0, np.nan))
-    found["notes"] += tuple(
-        f"{x.name} is at its bound ({x.which}): what was measured would have it beyond" for x in edges
-    )
     found |= {"measured": _places(measured, point), "bounds": edges}
     found |= {"histories": _histories(measured, equilibria.point_of(space.start), point)}
     found |= _common(task, asked, equilibria, space, point, file)

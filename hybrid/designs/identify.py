@@ -15,8 +15,8 @@ from scipy.stats import chi2, norm, t
 
 from hybrid.designs.case_results import FINER, IN_MOTION, AnyScene, Equilibria, Point
 from hybrid.designs.in_motion import NAMES as EDGES
-from hybrid.designs.nearest import Rows, Space, nearest
-from hybrid.designs.numbers_and_results import of_line
+from hybrid.designs.nearest import AT_BOUND, Rows, Space, nearest
+from hybrid.designs.numbers_and_results import of_line, scale_of
 from hybrid.designs.problem import cable_of
 from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
@@ -245,7 +245,8 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> tuple[P
     """
     rows, values = measured.rows, measured.values
     known = measured.deviations is not None
-    typical = float(np.abs(values).max(initial=0.0)) or 1.0
+    scene, largest = next(iter(equilibria.scenes.values())), float(np.abs(values).max(initial=0.0))
+    typical = scale_of(scene, quantity_of(measured.wanted[0][1]), largest) or 1.0
     scale = measured.deviations if measured.deviations is not None else np.full(values.size, typical)
 
     def off(x: Floats) -> Rows:
@@ -255,30 +256,46 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> tuple[P
     def refresh(point: Point) -> bool:
         return point.refresh({*equilibria.motions.rows})
 
-    best = nearest(off, space, 1.0 / UNKNOWN if known else LEAST, GAIN, refresh)
+    least = 1.0 / UNKNOWN if known else LEAST
+    best = nearest(off, space, least, GAIN, refresh)
     refresh(best.point)
     sizes = space.sizes(best.point.x)
-    u, s, v = np.linalg.svd(best.slopes() * sizes, full_matrices=False)
-    freedom = values.size - int(np.sum(s > SINGULAR * s.max(initial=0.0)))
+    slopes = best.slopes() * sizes
+    u, s, v = np.linalg.svd(slopes, full_matrices=values.size < sizes.size)
+    freedom = values.size - int(np.sum(s > max(SINGULAR * s.max(initial=0.0), least)))
     unit = 1.0 if known else math.sqrt(2.0 * best.cost / freedom) if freedom > 0 else math.inf
     s = np.append(s, np.zeros(sizes.size - s.size))
-    v = v if v.shape[0] == v.shape[1] else np.linalg.svd(v, full_matrices=True)[2]  # with what is at right angles to it
     seen = s > unit / UNKNOWN
-    estimates, correlations = _estimates(space.names, best, sizes, s, v, seen, unit, freedom if not known else None)
+    # what may be 0 is sought by parts of its range, and told apart by those of itself, or of what it may be off by
+    off_by = (unit if seen.any() else 0.0) * sizes * np.sqrt(((v[seen] / s[seen, None]) ** 2).sum(axis=0))
+    own = np.minimum(np.fmax(np.abs(best.point.x), off_by), sizes)
+    own[own == 0.0] = sizes[own == 0.0]
+    estimates, correlations = _estimates(
+        space.names, best, sizes, own, s, v, seen, unit, freedom if not known else None
+    )
     finer, notes = _by_cells(equilibria, best, rows, scale, u, s, v, seen, sizes)
     estimates = tuple(x._replace(by_cells=float(y)) for x, y in zip(estimates, finer, strict=True))
-    apart = tuple(_apart(space.names, best.point.x, v[k], v, s, seen, unit) for k in np.flatnonzero(~seen))
+    parts = v * sizes / own
+    apart = tuple(_apart(space.names, best.point.x, parts[k], parts, s, seen, unit) for k in np.flatnonzero(~seen))
     scatter = math.sqrt(2.0 * best.cost / values.size) * (1.0 if known else float(scale[0]))
     notes += [f"the search stopped before it was done: {best.stopped}"] if best.stopped else []
     notes += _doubts(best, freedom, known) + _after_each_other(best.values, measured.histories)
+    pull = slopes.T @ best.values  # to lower values
+    beyond = np.stack([pull, -pull], axis=1) > AT_BOUND * (slopes**2).sum(axis=0)[:, None]
+    notes += [
+        f"{space.names[i]} is at its bound ({('low', 'high')[k]}): what was measured would have it beyond"
+        for i, k in np.argwhere(space.at_bounds(best.point.x) & beyond)
+    ]
     found = {"estimates": estimates, "correlations": correlations, "apart": apart, "count": values.size}
-    return best.point, found | {"scatter": scatter, "notes": tuple(notes), "stated": known}
+    found |= {"scatter": scatter, "notes": tuple(notes), "stated": known, "settled": not best.stopped}
+    return best.point, found
 
 
 def _estimates(
     names: Sequence[str],
     best: Rows,
     sizes: Floats,
+    own: Floats,
     s: Floats,
     v: Floats,
     seen: np.ndarray,
@@ -288,7 +305,8 @@ def _estimates(
     """Estimates and correlations; freedom: of a deviation that is estimated, too; None: it is stated."""
     covariance = (v[seen].T / s[seen] ** 2) @ v[seen] * unit**2
     spread = sizes * np.sqrt(np.diag(covariance))
-    hidden = (np.abs(v[~seen]) > PART).any(axis=0) if (~seen).any() else np.zeros(sizes.size, bool)
+    unseen = v[~seen] * sizes / own
+    hidden = (np.abs(unseen) > PART * np.linalg.norm(unseen, axis=1, keepdims=True)).any(axis=0)
     spread[hidden] = np.inf
     level = 0.5 * (1.0 + CONFIDENCE)
     times = float(t.ppf(level, freedom if freedom is not None else np.inf)) if freedom != 0 else np.inf

@@ -301,6 +301,7 @@ class Motion:
         whose nodes there are outputs.
         """
         self.course, self.smooth = course, smooth
+        self.shapes: dict[Wanted, tuple[int, ...]] = {}
         self._smooth: dict[Wanted, Floats] = {}  # extremes of parabolas, where they have been asked for
         more = places_of_lines(scene, wanted) if smooth else None
         self._cables = {k: x.cable for k, x in scene.asked_lines.items()}
@@ -311,7 +312,7 @@ class Motion:
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.begin = {name: np.array(x.position[0]) for name, x in lines.items()}
             self._t = {name: np.array(x.t) for name, x in lines.items()}
-            self._histories = self._read(lines, wanted)
+            self._histories = self._read(lines, wanted, base)
         self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
         self.values = self._values(wanted, self.where, base)
         # of each result, when and where peaks are; one of all that are no extremes
@@ -320,7 +321,7 @@ class Motion:
             each = zip(wanted, self.where, strict=True)
             self.peaks = [peaks(self._table(x), x.over, where) for x, where in each]
         if not smooth:
-            self._histories, self._smooth = {}, {}
+            self._histories, self._smooth = {k: x for k, x in self._histories.items() if k.name == "phi"}, {}
 
     def beside(self, seen: Mapping[str, Seen], wanted: Sequence[Wanted]) -> Floats:
         """The same results of other outputs, by line, of a scene with another number.
@@ -329,7 +330,7 @@ class Motion:
         """
         other = copy(self)
         other._cables, other._t = {k: x.scene.cable for k, x in seen.items()}, {k: x.t for k, x in seen.items()}
-        other._histories = other._read(seen, wanted)
+        other._histories = other._read(seen, wanted, self)
         if other.shapes != self.shapes:
             raise Unfollowed("outputs of a section are more or fewer")
         return other.at_peaks(wanted, self.peaks)
@@ -339,12 +340,20 @@ class Motion:
         each = [(x, place) for x, places in zip(wanted, where, strict=True) for place in places]
         return self._values([x for x, _ in each], [place for _, place in each])
 
-    def _read(self, lines: Mapping[str, Any], wanted: Sequence[Wanted]) -> dict[Wanted, Floats]:
-        """Histories of results, of which there is one of many times; their shapes are noted."""
+    def _read(
+        self, lines: Mapping[str, Any], wanted: Sequence[Wanted], base: Motion | None = None
+    ) -> dict[Wanted, Floats]:
+        """Histories of results, of which there is one of many times; their shapes are noted.
+
+        base: within half a turn of whose angles angles are.
+        """
         out: dict[Wanted, Floats] = {}
         for x in wanted:
             if x.place not in out:
                 out[x.place] = self._history(lines[x.line], x)
+                if x.name == "phi" and base is not None and out[x.place].shape == base.shapes[x.place]:
+                    turns = np.rint((base._histories[x.place] - out[x.place]) / (2.0 * np.pi))
+                    out[x.place] = out[x.place] + 2.0 * np.pi * turns
         self._smooth = {}
         self.shapes = {place: history.shape for place, history in out.items()}
         self._cuts = {place: self._cut(lines[place.line], place, shape[-1]) for place, shape in self.shapes.items()}

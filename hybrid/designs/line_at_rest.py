@@ -299,7 +299,7 @@ class LineAtRest:
     def _held_ends(self, x: Beside) -> Ends:
         """Ends of a line; one at a free point counts as held, by it."""
         held, position = x.ends.held.copy(), x.ends.position.copy()
-        held[self._free] = 1
+        held[self._free] = JOINED
         for k in self._free:
             position[k] = self.state.r[-k]
         return x.ends._replace(held=held, position=position)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from hybrid.designs.case_results import Equilibria, Point
-from hybrid.designs.numbers_and_results import number_of
+from hybrid.designs.numbers_and_results import number_of, parse_wanted, scale_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.read import SceneLike, as_scene
@@ -28,18 +28,22 @@ GAIN, SINGULAR = 1e-9, 1e-9
 
 
 class Space(NamedTuple):
-    """The unknowns: names, where they begin, and between what they stay (n,); infinite: no bound."""
+    """The unknowns: names, where they begin, and between what they stay (n,); infinite: no bound.
+
+    most: of what they change by parts, at most: of coordinates, which go by the origin, the length of a line.
+    """
 
     names: tuple[str, ...]
     start: Floats
     low: Floats
     high: Floats
+    most: Floats | float = np.inf
 
     def sizes(self, x: Floats) -> Floats:
         """What unknowns at x change by parts of: themselves, or their range where 0 is in it."""
         through = (self.low < 0.0) & (self.high > 0.0) | (x == 0.0)
         range_ = np.where(np.isfinite(self.high - self.low), self.high - self.low, np.maximum(np.abs(x), 1.0))
-        return np.asarray(np.where(through, range_, np.abs(x)))
+        return np.minimum(np.where(through, range_, np.abs(x)), self.most)
 
     def at_bounds(self, x: Floats) -> NDArray[np.bool_]:
         """Which unknowns at x are at their low and high (n, 2)."""
@@ -103,6 +107,8 @@ def nearest(
             return here._replace(stopped=why)
         assert there is not None
         here = there
+    else:
+        return here._replace(stopped=f"{ROUNDS} steps were not enough")
     return here
 
 
@@ -157,7 +163,8 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
         raise SceneError([Complaint(zero, "0", "a number to begin with, which keeps its sign", "a first guess")])
     goal = np.array(list(targets.values()), float)
     equilibria = Equilibria({"": asked}, [(key,) for key in by], [("", name) for name in targets])
-    scale = np.abs(goal)
+    names = [parse_wanted(asked, name, moves=False).name for name in targets]
+    scale = np.array([scale_of(asked, *x) for x in zip(names, goal.tolist(), strict=True)])
     if not goal.all():  # what is sought to be 0 is as large as it is at first, or as the numbers can make it
         first_point = equilibria.point_of(start)
         size = np.maximum(np.abs(first_point.values), np.abs(first_point.slopes) @ np.abs(start))

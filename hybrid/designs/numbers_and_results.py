@@ -103,6 +103,12 @@ def size_of(asked: Scene, key: str, number: float) -> float:
     return abs(number) or 1.0
 
 
+def scale_of(asked: Scene, quantity: str, value: float) -> float:
+    """What differences from a value are parts of: of coordinates, which go by the origin, of no more than a line."""
+    size = abs(value)
+    return min(size, asked.length) if quantity.split(".")[0].endswith("position") else size
+
+
 def unit_of_key(scene: Scene, key: str) -> str:
     """The unit that the reference of scenes has for a key; "": none."""
     value, unit = cast(Any, scene.written), ""

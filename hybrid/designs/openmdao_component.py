@@ -83,7 +83,7 @@ class DesignComponent(ExplicitComponent):
 def _units(unit: str) -> str | None:
     """A unit such as N m^2 as OpenMDAO writes it; None: it has none, or not such a one."""
     text = unit.replace("^", "**").replace(" ", "*")
-    return text if text and valid_units(text) else None
+    return text if text and "," not in text and valid_units(text) else None
 
 
 def _described(text: str, unit: str) -> str:

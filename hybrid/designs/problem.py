@@ -17,7 +17,7 @@ from hybrid.designs.case_results import IN_MOTION, AnyScene, Equilibria, Point
 from hybrid.designs.in_motion import is_edge
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers_and_results import PART as KEY_PART
-from hybrid.designs.numbers_and_results import computing, number_of, of_line, unit_of_key
+from hybrid.designs.numbers_and_results import PLACE, computing, number_of, of_line, scale_of, unit_of_key
 from hybrid.errors import SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -55,7 +55,7 @@ class Constraint(NamedTuple):
 
         By the value; the logarithm of what is positive, which changes more evenly with lengths.
         """
-        if self.bound > 0.0 and value > 0.0:
+        if self.bound == self.scale and value > 0.0:
             return float(np.log(value / self.bound)), 1.0 / value
         return (value - self.bound) / self.scale, 1.0 / self.scale
 
@@ -198,14 +198,15 @@ def problem_of(task: TaskFile[Design], scene: AnyScene) -> Problem:
 
     for name, aim in asked.targets.items():
         case, result = aim.case or next(iter(scenes)), _result(task, ("targets", name), aim, aim.take or "", scene)
-        constraints.append(Constraint(name, case, result, row(case, result), aim.value, 0, abs(aim.value)))
+        scale = scale_of(scene, aim.quantity, aim.value)
+        constraints.append(Constraint(name, case, result, row(case, result), aim.value, 0, scale))
     for name, limit in asked.limits.items():
         for case in limit.cases or scenes:
             for bound, side in ((limit.largest, 1), (limit.smallest, -1)):
                 if bound is not None:
                     for result in _pieces(task, ("limits", name), limit, "max" if side > 0 else "min", scene):
-                        constraint = Constraint(name, case, result, row(case, result), bound, side, abs(bound))
-                        constraints.append(constraint)
+                        scale = scale_of(scene, limit.quantity, bound)
+                        constraints.append(Constraint(name, case, result, row(case, result), bound, side, scale))
     for name, each in asked.results.items():
         case, result = each.case or next(iter(scenes)), _result(task, ("results", name), each, each.take or "", scene)
         spoken[name] = row(case, result)
@@ -215,14 +216,17 @@ def problem_of(task: TaskFile[Design], scene: AnyScene) -> Problem:
 
 
 def begun(problem: Problem) -> Problem:
-    """The problem with scales of what has to be 0: what it is where the search begins.
+    """The problem with scales of what has to be 0: what it is where the search begins, or unknowns can make it there.
 
     ComputationError: there is no equilibrium there; SceneError: results that are not there.
     """
     point = problem.equilibria.point_of(problem.space.start)
     if problem.objective is not None:
         problem.objective.value(point)  # refused before the search
-    scaled = [x._replace(scale=x.scale or abs(float(point.values[x.row])) or 1.0) for x in problem.constraints]
+    if all(x.scale for x in problem.constraints):
+        return problem
+    size = np.maximum(np.abs(point.values), np.abs(point.slopes) @ problem.space.sizes(problem.space.start))
+    scaled = [x._replace(scale=x.scale or float(size[x.row]) or 1.0) for x in problem.constraints]
     return problem._replace(constraints=tuple(scaled))
 
 
@@ -264,7 +268,8 @@ def space_of(
                 values.append(x)
     if found:
         raise task.refusal(found)
-    return Space(tuple(task.asked.unknowns), np.array(start), np.array(low), np.array(high)), keys
+    most = np.array([scene.length if PLACE.search(group[0]) else np.inf for group in keys])
+    return Space(tuple(task.asked.unknowns), np.array(start), np.array(low), np.array(high), most), keys
 
 
 def _key_findings(

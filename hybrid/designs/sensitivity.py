@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, overload
 
@@ -187,7 +188,7 @@ def shares(study: str | Path, result: str) -> Shares:
         )
     names = _variables(found, stored)
     x = np.stack([found.data[name].values[found.done] for name in names], axis=1)
-    row = stored["rows"][0] | dict(zip(names, x.mean(axis=0).tolist(), strict=True))
+    row = stored["rows"][int(found.done.argmax())] | dict(zip(names, x.mean(axis=0).tolist(), strict=True))
     scene = scene_of(stored["base"], stored["keys"], row)
     text = _derived_from(found, result, bool(stored["static"]))
     g = _slopes(scene, text, {name: stored["keys"][name] for name in names}, bool(stored["static"]))
@@ -251,7 +252,9 @@ def _indices(study: str | Path, result: str, found: StudyResult) -> dict[str, tu
     """First-order and total indices of Sobol by variable, of a design for them of which all cases are done."""
     if found.method != DESIGNS[0] or not found.done.all():
         return {}
-    return {x.variable: (x.first, x.total) for x in of_study(study, result)}
+    with suppress(ResultError):  # a design that only_if has cut, or that lists cross
+        return {x.variable: (x.first, x.total) for x in of_study(study, result)}
+    return {}
 
 
 def _shares(

@@ -89,6 +89,9 @@ PLACE, LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface)$"), re.compile(r"(\b
 OF_WAVES, WAVE = 4e-6, re.compile(r"\bwaves\b")
 # Of the axes of two planes that are one, by rounding.
 SAME_PLANE = 1e-12
+# Part of the length, and of the tension scale, that a number moves by no more than by rounding: of a line in a plane
+# what leaves it changes no tension.
+ROUNDED = 1e-12
 AT_START = 2  # corrections of an equilibrium, and of first accelerations, with factors of their own
 # Numbers that outputs of the other lines may take in memory, 1 GB.
 MOST_SAMPLED = 128_000_000
@@ -544,9 +547,11 @@ class NetworkOthers:
     @property
     def errors(self) -> Floats:
         """(P,) parts of tangents by which they may be off: what the last corrections leave of them."""
-        sizes = np.maximum(self.sizes, 1e-300)
-        left = np.maximum(sizes[..., LEFT_R] / sizes[..., LARGEST_R], sizes[..., LEFT_T] / sizes[..., LARGEST_T])
-        return np.asarray(left.max(axis=1))
+        models = self._model.models
+        rounded = ROUNDED / np.abs(self._steps)[:, None]
+        r = np.maximum(self.sizes[..., LARGEST_R], rounded * [x.length for x in models])
+        T = np.maximum(self.sizes[..., LARGEST_T], rounded * [x.tension_scale for x in models])
+        return np.asarray(np.maximum(self.sizes[..., LEFT_R] / r, self.sizes[..., LEFT_T] / T).max(axis=1))
 
     # --- what is found ----------------------------------------------------------------------------------
 

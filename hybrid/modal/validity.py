@@ -194,7 +194,7 @@ def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
 def _crossing(x: LoadedLine, gap: Floats, way: Floats, what: str) -> Iterator[str]:
     """Where a motion (F, N+1) m along the normal of what is touched crosses it; gap: (N+1,) m, at rest."""
     up = np.sqrt(0.5 * (np.abs(way) ** 2).sum(axis=0))
-    share = np.append(x.line.h, x.line.h[-1])
+    share = 0.5 * (np.append(x.line.h, 0.0) + np.append(0.0, x.line.h))
     # the length over which a motion of two standard deviations crosses it
     crosses = float(share[2.0 * up > np.abs(gap)].sum())
     if crosses > LIFTS * float(x.line.s[-1]):

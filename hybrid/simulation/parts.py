@@ -186,6 +186,9 @@ class Part:
         """While accelerations are found: second rates (N,) m/s2 of the lengths of cells, by line."""
         raise NotImplementedError
 
+    def find_rotors(self, find: Callable[[], None]) -> None:
+        """Accelerations that are about to be found jump: those of rotors, by `find` with some of them.  LineFailed."""
+
     @property
     def breaks(self) -> list[float]:
         """Times (s) at which a step ends, and what holds lines may change."""

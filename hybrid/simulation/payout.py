@@ -16,7 +16,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.paid_length import carry_layers, length_at
 from hybrid.kernels.reel.payout import end_payout, fit_line, lengthen, put_forces_on, remove_forces
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, energy_of, place_reel
-from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job
+from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job, losses, tension_held
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, copied, slip_size, state_for
@@ -174,6 +174,17 @@ class PayingOut:
     def holds_tension(self) -> bool:
         """Whether a winch holds a tension."""
         return bool(self.winch.tension)
+
+    def taken(self, t: float) -> float:
+        """What inertia, losses and tension of a winch take at t (s), N."""
+        winch = self.winch
+        lost, _ = losses.py_func(winch, winch.rate_now)
+        return float(winch.inertia * winch.true_now + lost + tension_held.py_func(winch, t))
+
+    def accelerate(self, more: float) -> None:
+        """A winch that holds a tension accelerates by so much more (m/s2)."""
+        self.winch.true_now += more
+        self.winch.algorithmic_now = self.winch.true_now
 
     @property
     def fastest(self) -> float:

@@ -198,6 +198,12 @@ class RunOfLines:
         for part in self.parts:
             part.adopt_cells(number, model.line)
 
+    def end_step(self) -> None:
+        """Nothing of the step that led here is left to do, of which a checkpoint would not know."""
+        if self.loop.is_open:
+            self._attach()
+            self.loop.end_step()
+
     def renew_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
         self.other = self.state.copy()
@@ -249,13 +255,19 @@ class RunOfLines:
         accelerations = [model.ends.acceleration(self.t, 1e-3 * step) for model in self.model.models]
         self.place_ends(self.t)
         self.model.update_water(self.t, self.state.bodies, 0.0, solver.bodies)
-        lengthening: dict[int, Floats] = {}
-        with ExitStack() as stack:
-            for forces_on in self.parts.forces_on:
-                lengthening |= stack.enter_context(forces_on())
-            taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
-        if taken.outcome != Outcome.OK:
-            raise self._explained(taken, 0.0)
+
+        def find() -> None:
+            lengthening: dict[int, Floats] = {}
+            with ExitStack() as stack:
+                for forces_on in self.parts.forces_on:
+                    lengthening |= stack.enter_context(forces_on())
+                taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
+            if taken.outcome != Outcome.OK:
+                raise self._explained(taken, 0.0)
+
+        for part in self.parts:
+            part.find_rotors(find)
+        find()
 
     # --- other lines in mid-motion --------------------------------------------------------------------
 

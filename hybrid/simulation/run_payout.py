@@ -6,7 +6,7 @@ a winch Python changes the line, and the network gets another solver.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import Any
@@ -19,6 +19,7 @@ from hybrid.kernels.mesh.zone_criteria import soften
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, limit_next_step, pay_out, stand_among, stand_still
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import FORCE_A, FORCE_B
 from hybrid.kernels.state.state import Floats, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout
@@ -246,6 +247,31 @@ class RunPayout(Part):
             for x in self.lines.values():
                 stack.enter_context(x.forces_on())
             yield {k: x.lengthening for k, x in self.lines.items()}
+
+    def find_rotors(self, find: Callable[[], None]) -> None:
+        """Winches that hold a tension accelerate by the pull that the lines have now, which is linear in that."""
+        run = self._run
+        free = {k: x for k, x in self.lines.items() if x.holds_tension and run.t > x.winch.begin}
+        if not free:
+            return
+
+        def left() -> Floats:  # N, that acts on the rotors
+            find()
+            at = {k: FORCE_B if x.plan.side else FORCE_A for k, x in free.items()}
+            pulls = {k: np.linalg.norm(run.solver.work[k].report[i : i + 3]) for k, i in at.items()}
+            return np.array([pulls[k] - x.taken(run.t) for k, x in free.items()])
+
+        for line in run.lines:
+            line.books.counts.repeats = 1  # no extremes of what is tried
+        first, answers = left(), []
+        for x in free.values():
+            x.accelerate(1.0)
+            answers.append(left() - first)
+            x.accelerate(-1.0)
+        for x, more in zip(free.values(), np.linalg.solve(np.array(answers).T, -first), strict=True):
+            x.accelerate(float(more))
+        for line in run.lines:
+            line.books.counts.repeats = 0
 
     def after_step(self) -> None:
         """Nodes enter and leave.  LineFailed: a winch has come to its end."""

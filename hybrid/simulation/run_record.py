@@ -317,6 +317,7 @@ class RecordedRun(RunOfLines):
         self.gather_events()
         made = monotonic() - begin
         if new:
+            self.end_step()
             begins_late = self._checked < 0 and self.recorder.is_late
             self.cpu, self._checked = clock_now() - self._begin, self.steps
             self.recorder.checkpoint(partial(content, self))

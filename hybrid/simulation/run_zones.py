@@ -291,6 +291,7 @@ class RunZones(Part):
         end, last = float(clock.try_end), bool(0.5 * clock.tried_dt < clock.shortest)  # the last: no shorter is left
         if step != self._rescued:
             self._rescues, self._rescued = 0, step
+        used_up = 0 < run.loop.counts.most_iterations <= run.loop.counts.taken  # another try would have no iteration
         for x in self.lines:
             k = x.number
             old, new = run.state.lines[k], run.other.lines[k]
@@ -301,7 +302,7 @@ class RunZones(Part):
             change = x.switching.rescue(taken, end, new, self._rescues)
             if change is None and last:
                 change = x.switching.all_rod(taken)
-            if change is not None:
+            if change is not None and not used_up:
                 changes.append((x, change))
         self._rescues += bool(changes)
         self._change(changes)

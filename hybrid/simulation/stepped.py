@@ -300,6 +300,7 @@ def kept(run: Run) -> dict[str, Any]:
     run.write_log()
     run.ends_of_now()
     run.gather_events()
+    run.end_step()
     models = run.model.models
     found = {"run": copied(checkpoint(run)), "model": run.model, "marks": marks_of(run), "before": run.other.copy()}
     found |= {"stood": tuple((x.ends.values.position.copy(), x.ends.values.frame.copy()) for x in models)}

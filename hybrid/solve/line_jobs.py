@@ -27,7 +27,9 @@ from hybrid.kernels.junctions.body_contact import CARRY, EACH_BODY, TOUCHED, bla
 from hybrid.kernels.junctions.borders import (
     APART,
     APART_ALWAYS,
+    HELD,
     JOINED,
+    NONE,
     NetworkTask,
     blank_border_job,
     blank_network_job,
@@ -148,13 +150,21 @@ class JointJobs:
 # --- arrays of borders ------------------------------------------------------------------------------
 
 
+def joints_of(lines: Sequence[JoinedLine]) -> NDArray[np.int64]:
+    """(L, 2) what starts and ends are joined to, as of a kernels.junctions.borders.NetworkJob."""
+    joints = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
+    held = [x.joints[0] >= 0 > x.joints[1] and x.ends.held[1] != 0 for x in lines]
+    joints[np.flatnonzero(held), 1] = HELD
+    return joints
+
+
 def room_of_joints(lines: Sequence[JoinedLine], carried: Sequence[int], points: int, bodies: Floats) -> Values:
     """Room of points and bodies; carried: blocks of each line that is solved for more right-hand sides."""
-    joints = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
+    joints = joints_of(lines)
     turns = any(x.seats[:, TURNS].any() for x in lines)
     columns = np.zeros((COLUMNS if turns else 3, max(sum(carried), 1), SIZE))
     own = 3 * points + 6 * len(bodies)
-    unknowns = int((joints[:, 1] >= 0).sum()) + own
+    unknowns = int((joints[:, 1] != NONE).sum()) + own
     shapes: dict[str, Any] = {"functional": FUNCTIONAL, "answers": (2, ANSWER), "q": COLUMNS, "right": own, "moves": 3}
     shapes |= {"net": (points, 3), "work": (len(bodies), WORK), "S": (HANDED - 1, HANDED), "G": (2, 6, 6)}
     shapes |= {"A": (unknowns + 5, unknowns + 1)}
@@ -235,7 +245,7 @@ class LineJobs:
         self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
         self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
         self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
-        self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
+        self.joints = joints_of(lines)
         self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
         self._rides = lines[0].rides[: 0 if apart else None]  # obstacles are those of all lines
         reaches = [bool(x.line.bits & OBSTACLES) for x in lines]

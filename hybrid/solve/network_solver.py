@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_pairs import Contact
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
+from hybrid.kernels.junctions.borders import NONE
 from hybrid.kernels.laws.obstacles import carry_obstacles
 from hybrid.kernels.laws.seabed import lie_in_soil, rest_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
@@ -432,7 +433,7 @@ class NetworkSolver(LineJobs):
             inverse = columns[:, None] * np.linalg.inv(rows[:, None] * A * columns) * rows
         except np.linalg.LinAlgError:
             return None
-        first = int((self.joints[:, 1] >= 0).sum())
+        first = int((self.joints[:, 1] != NONE).sum())
         return np.asarray(-inverse[first:, first:])
 
     def is_stable(self, states: NetworkState) -> bool:

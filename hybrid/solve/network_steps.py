@@ -22,6 +22,7 @@ from hybrid.kernels.run.network_run import (
     LINE,
     REGROUP,
     blank_steps_job,
+    renew_ended,
     run_lines,
     run_network,
     sample_network,
@@ -289,6 +290,15 @@ class NetworkSteps:
         """Whether an output is due at the state as it is."""
         at, near = self.counts.output, SAME_TIME * self.clock.leg_step
         return bool(at < self.outputs.size and self.outputs[at] <= self.clock.now + near)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether something is left to do of a shortened step that has led to a stop."""
+        return self.counts.phase == b.END_STEP and self.counts.repeats > 0
+
+    def end_step(self) -> None:
+        """Do that now: nothing of it is kept."""
+        renew_ended(self._job.numbers)
 
     @property
     def is_half_full(self) -> bool:

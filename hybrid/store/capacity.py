@@ -162,13 +162,19 @@ def mooring_use(
         if pretension.lines or abs(float(pretension.s[-1] - result.s[-1])) > 1e-6 * float(result.s[-1] - result.s[0]):
             raise ResultError("mooring\n    expected: the pretension of the same line, or a number in N")
         there, tension = pretension.both_sides("tension")
-        before = tension[0] if np.array_equal(there, s) else np.interp(s, there, tension[0])
+        before = tension[0] if np.array_equal(there, s) else _along(s, there, tension[0])
     most = T.max(axis=0)
     if has_envelope(result) and f"{GROUP}/tension_max" in result:
-        most = np.maximum(most, np.interp(s, result[SCALE], result[f"{GROUP}/tension_max"]))
+        most = np.maximum(most, _along(s, result[SCALE], result[f"{GROUP}/tension_max"]))
     first, second = factors
     at_outputs, largest = ((before * first + (x - before) * second) / strength for x in (T, most))
     return s, at_outputs, largest
+
+
+def _along(s: Floats, there: Floats, x: Floats) -> Floats:
+    """Values x at places `there` (n,) m, linear between them, at s (m,) m; of places that come twice on their side."""
+    left, right = np.interp(-s, -there[::-1], x[::-1]), np.interp(s, there, x)
+    return np.where(np.append(np.diff(s) == 0.0, False), left, right)
 
 
 # How near a torque is to throwing a loop, and whether a loop pulled tight kinks before it pops out.

@@ -204,6 +204,10 @@ class StudyFile:
         """Whether there is a column of that name."""
         return name in self._arrays
 
+    def shape_of(self, name: str) -> tuple[int, ...]:
+        """Shape of a column in one case."""
+        return tuple(self._arrays[name].shape[1:])
+
     def coordinate(self, name: str) -> np.ndarray | None:
         """Values of a dimension; None: there are none yet, or a kill came while they were written."""
         if name not in self._coordinates:

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import Complaint, ResultError, SceneError, optional_package
-from hybrid.scene.base import places_of_files
+from hybrid.scene.base import FORMER_NAMES, places_of_files
 from hybrid.scene.read import as_scene, read_text, text_of
 from hybrid.scene.root import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
@@ -97,7 +97,10 @@ def sensitivity(study: str | Path, result: str) -> list[Influence]:
             )
         bounds = json.loads(found.attrs["bounds"])
         if done.size != sample["count"] * (len(bounds) + (2 if method == "saltelli" else 1)):
-            raise ResultError(f"{study} crosses a design of {method} with lists of values: analyse one value at a time")
+            raise ResultError(
+                f"{study} has {done.size} cases, and not those of a design of {method} alone\n"
+                "    try:      a study without only_if, without cases, and of one value of each list"
+            )
         return _of_design(method, bounds, found, values)
     return _ranked(found, values, done)
 
@@ -204,7 +207,7 @@ class Cases:
     def files(self) -> dict[str, str]:
         """Hashes of the files that scenes read, by path."""
         named = {x for row in self.rows for x in row.values() if isinstance(x, str)}
-        named |= {x for *_, x in places_of_files(self.base)}
+        named |= {x for *_, x in places_of_files([self.base, self.rows])}
         return {x: digest_of(x) for x in sorted(named) if len(x) < LONGEST_PATH and Path(x).is_file()}
 
 
@@ -231,8 +234,14 @@ def cases_of(study: Study) -> Cases:
     read_text(text, study.scene, settings)  # refused with the names of the keys
     of_files = {name for name, paths in keys.items() if any(re.search(r"\.(file|rao)$", path) for path in paths)}
     for row in rows:
-        row |= {k: str((Path(study.scene).parent / row[k]).absolute()) for k in of_files if isinstance(row.get(k), str)}
+        row |= {k: deepcopy(x) for k, x in row.items() if isinstance(x, dict | list)}
+        within = [(row, k, row[k]) for k in of_files if isinstance(row.get(k), str)]
+        for table, key, path in [*within, *places_of_files([x for x in row.values() if isinstance(x, dict | list)])]:
+            table[key] = str((Path(study.scene).parent / path).absolute())
     base = scene.model_dump(mode="json", exclude_none=True)
+    written = scene.model_dump(mode="json", exclude_none=True, exclude_unset=True)
+    for table in (path.removesuffix(".kind") for paths in keys.values() for path in paths if path.endswith(".kind")):
+        _set(base, table, _table_at(written, table))  # defaults are those of a kind
     bounds = {short[name]: (each.low, each.high) for name, each in study.vary.items() if each.low is not None}
     derived = {name: np.array(evaluated(f"derive.{name}", x, rows)) for name, x in study.derive.items()}
     return Cases(base, keys, rows, derived, units, study.static, bounds)  # type: ignore[arg-type]
@@ -343,14 +352,29 @@ def _chosen(study: Study, rows: list[Row]) -> list[Row]:
     return [row for row, is_in in zip(rows, evaluated("only_if", study.only_if, rows), strict=True) if is_in]
 
 
+def _parts(path: str) -> list[str | int]:
+    """Names and numbers that lead to a value in tables and lists."""
+    return [int(x[1:]) if x[0] == "[" else x.strip() for x in re.findall(r"\[\d+|[^.\[\]]+", path)]
+
+
+def _table_at(data: Any, path: str) -> Any:
+    """The table at a path; {} where there is none."""
+    for part in _parts(path):
+        data = data[part] if isinstance(part, int) else data.get(part, {})
+    return data
+
+
 def _set(data: Any, path: str, value: Any) -> None:
     """Set a value in tables and lists; tables that are not there are made."""
-    parts: list[str | int] = [int(x[1:]) if x[0] == "[" else x.strip() for x in re.findall(r"\[\d+|[^.\[\]]+", path)]
+    parts = _parts(path)
     for part, after in pairwise(parts):
         if isinstance(data, dict) and not isinstance(data.get(part), dict | list):
             data[part] = {} if isinstance(after, str) else []
         data = data[part]
-    data[parts[-1]] = value
+    last = parts[-1]
+    if isinstance(data, dict) and last not in data:  # under its former name
+        last = next((now for now, former in FORMER_NAMES.items() if last in former and now in data), last)
+    data[last] = value
 
 
 # Tables in CSV files: a header and rows, with their lines in the file.

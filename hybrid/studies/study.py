@@ -338,13 +338,14 @@ def study(
     _refuse_several_values(wanted)
     _refuse_limits_not_there(cases, wanted)
     identity = _identity(cases, wanted, asked.derive, asked.files, parts)
-    whole = target.with_suffix(".files") if asked.files else None
+    folder = target.with_name(f"{target.name.removesuffix('.zarr')}.files")
+    whole = folder if asked.files else None
     with locked(target):
         if target.exists():
             there = StudyFile(target)  # nothing else is removed
             if overwrite or (there.attributes["identity"] != identity and (there.status == OPEN).all()):
                 rmtree(target)
-                _remove_cases(target.with_suffix(".files"))
+                _remove_cases(folder)
         if target.exists():
             file = StudyFile(target)
             _refuse_other(file, identity)
@@ -512,7 +513,8 @@ def _created(
         )
         columns[name] = Column(cases.units.get(name, ""), ", ".join(cases.keys[name]), (), array)
     for name, values_of in cases.derived.items():
-        columns[name] = Column("", asked.derive[name], (), np.asarray(values_of))
+        array = values_of.astype(float) if values_of.dtype.kind == "i" else values_of
+        columns[name] = Column("", asked.derive[name], (), array)
     stored = {"base": cases.base, "keys": cases.keys, "rows": rows, "static": cases.static}
     stored |= {"parts": [x.name for x in parts]} if parts else {}
     texts: dict[str, Any] = {"study": stored, "variables": list(columns), "files": cases.files, "bounds": cases.bounds}

@@ -19,7 +19,7 @@ from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, ResultError, SceneError
 from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.simulation.own_parts import RunPart
 from hybrid.statistics import moments
-from hybrid.store.envelope import farthest
+from hybrid.store.envelope import extreme, farthest
 from hybrid.store.histories import History, extreme_of, history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
@@ -135,7 +135,8 @@ def _taken(
     if take in ("max", "min") and at is None and kept.times is None:
         known = _over_steps(result, name, take)
         if known is not None:
-            return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known)
+            unit = result.units[name if name in result else f"envelope/{name}_{take}"]
+            return Variable(unit, f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known)
     if take == "utilisation":
         limit = LIMIT_OF[name]
         return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(_utilisation(result, name, limit))
@@ -187,13 +188,20 @@ def _profile(history: History, name: str, along: str, label: str) -> tuple[Varia
     """The largest values along the line, over the dimension `along`."""
     if history.s is None:
         raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
-    return Variable(history.unit, label, (along,), {along: ("m", history.s)}), np.fmax.reduce(history.values, axis=0)
+    s, values = _once(history.s, np.fmax.reduce(history.values, axis=0))
+    return Variable(history.unit, label, (along,), {along: ("m", s)}), values
+
+
+def _once(s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Places (n,) m and values (n,) there; of two at one place the larger: all that lies along a line has one axis."""
+    first = np.flatnonzero(np.insert(np.diff(s) > 0.0, 0, True))
+    return s[first], np.fmax.reduceat(values, first)
 
 
 def _over_steps(result: Result, name: str, take: str) -> float | None:
     """The largest or smallest value over every step, NaN without one; None: the result knows that of outputs only."""
     if f"envelope/{name}_{take}" in result:
-        farther = farthest(result, name, take)
+        farther = (farthest if name in result else extreme)(result, name, take)
         return np.nan if farther is None else farther.value
     known = at_every_step(result, name, "largest" if take == "max" else "smallest")
     return None if known is None else known[0]
@@ -218,6 +226,7 @@ def _damage(result: Result, own: str, kept: Kept, at: Floats | None) -> tuple[Va
     text = f"fatigue damage by {kept.curve}"
     if at is None:
         along = "s" if kept.line is None else f"{own}_s"
+        s, damage = _once(s, damage)
         return Variable("", text, (along,), {along: ("m", s)}), damage
     dims, places = _places(own, s)
     return Variable("", text, dims, places), damage if dims else damage[0]
@@ -369,7 +378,7 @@ def _fits(
             new[dim] = Column(unit, "arc length" if unit == "m" else "time", (), np.asarray(along, float))
         elif known.shape != np.shape(along) or not np.allclose(known, along, rtol=1e-9, atol=1e-12):
             return False
-    if shapes.get(name, values.shape) != values.shape:
+    if shapes.get(name, file.shape_of(name) if name in file else values.shape) != values.shape:
         return False
     shapes[name] = values.shape
     coordinates.update(new)

@@ -293,3 +293,9 @@ def test_a_body_turns_as_moordyn_turns_it(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no line"):
         moordyn.GetLine(network, 1)
     moordyn.Close(network)
+
+
+def test_nodes_of_moordyn_may_be_numbers_of_numpy():
+    from hybrid.couple.moordyn import MoorDynLine
+
+    assert MoorDynLine(None, 1, "line1", 0, 10).node(np.int64(3)) == 3

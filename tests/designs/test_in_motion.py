@@ -23,7 +23,7 @@ from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import in_full
 from tests.combinations.pairs import as_network
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, pinned_at, span
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -409,3 +409,26 @@ def test_what_is_not_followed_is_left_to_differences_and_said() -> None:
     assert in_motion(as_scene(tables), of, [key]).ways == (TANGENTS,)
     tables["environment"]["seabed"] = {"z": -60.0, "stiffness": 5e3, "friction": 0.5}
     assert in_motion(as_scene(tables), of, [key]).ways == (f"{DIFFERENCES}: friction of the bed",)
+
+
+def test_errors_of_what_leaves_a_plane_are_not_those_of_rounding():
+    scene = hybrid.validate_scene(span(time=(1.0, 0.05), output=(0.1, 21)))
+    (found,) = hybrid.sensitivity(scene, ["last position.y@50"], ["ends.end.position[1]"], motion=True)
+    assert found.error < 1e-3 * abs(found.derivative)
+
+
+def test_the_derivative_of_an_angle_of_half_a_turn():
+    section = {"length": 100, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6}
+    scene = hybrid.validate_scene(
+        cable_scene(
+            section,
+            pinned_at(0, 0, 0),
+            pinned_at(-80, 0, 0),
+            model="catenary",
+            mesh=20,
+            time=(1.0, 0.05),
+            output=(0.1, 21),
+        )
+    )
+    (found,) = hybrid.sensitivity(scene, ["last phi@50"], ["ends.end.position[1]"], motion=True)
+    assert found.derivative == pytest.approx(-1 / 80, rel=1e-5)

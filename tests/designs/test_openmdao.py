@@ -205,3 +205,9 @@ def test_without_openmdao_it_says_what_to_install(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(sys.modules, "openmdao.api", None)
     with pytest.raises(hybrid.ResultError, match=r"hybrid-cable\[openmdao\]"):
         hybrid.openmdao_component(HANGING, unknowns={"length": {"key": LENGTH}}, results={"top": TOP})
+
+
+def test_numbers_of_tables_are_inputs() -> None:
+    from hybrid.designs.openmdao_component import _units
+
+    assert _units("1/m, N m") is None and _units("N m^2") == "N*m**2"

@@ -182,3 +182,32 @@ def test_kills(name: str, count: int, seed: int, tmp_path: Path) -> None:
     print(f"\n{name}: " + ", ".join(f"{text} {number}" for text, number in went.items()))
     assert went["opened"] == went["killed"] - went["before there was a file"]
     assert went["steps times cells recomputed"] <= 2 * WORK
+
+
+def falling(duration):
+    """A line falls back on a hard bed when the force at its end is let go: steps are repeated in halves."""
+    section = {"length": 20.0, "mass": 5.0, "diameter": 0.05, "bending_stiffness": 2.0, "damping": {"mass": 0.2}}
+    return {
+        "environment": {"seabed": {"z": -5.0, "stiffness": 1e8, "damping": 1e4, "friction": 0.5}},
+        "cable": {"sections": [section]}, "mesh": {"cells": 20}, "model": "rod", "initial": "equilibrium",
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
+                 "end": {"kind": "free", "force": {"value": [300, 0, 60], "until": 1.0}}},
+        "time": {"duration": duration, "step": 0.1}, "output": {"every": 0.1},
+    }  # fmt: skip
+
+
+def test_a_run_goes_on_to_the_bit_behind_a_step_that_was_shortened(tmp_path):
+    whole = hybrid.run(falling(2.0), output=tmp_path / "whole.h5")
+    first = float(whole["steps/t"][np.flatnonzero(whole["steps/repeats"])[0]])
+    hybrid.run(falling(round(np.ceil(10.0 * first - 1e-6) / 10.0, 6)), output=tmp_path / "part.h5")
+    assert np.array_equal(hybrid.resume(tmp_path / "part.h5", until=2.0).position, whole.position)
+
+
+def test_a_step_that_is_taken_back_is_the_same_again():
+    with hybrid.Simulation(falling(5.0)) as line:
+        while line.t < 3.0:
+            saved = line.save()
+            once = line.step(), line.forces().start.copy()
+            line.restore(saved)
+            again = line.step(), line.forces().start.copy()
+            assert once[0] == again[0] and np.array_equal(once[1], again[1])

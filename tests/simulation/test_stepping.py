@@ -498,3 +498,30 @@ def test_what_is_not_held_has_none() -> None:
         with pytest.raises(ValueError, match="expected 'start' or 'end'"):
             cable.stiffness("middle")
         assert np.linalg.eigvalsh(0.5 * (cable.stiffness("start") + cable.stiffness("start").T)).min() > 0.0
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_a_step_whose_iterations_are_used_up_is_not_refused_for_its_error(most):
+    section = {"length": 100, "mass": 50, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+    scene = {
+        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "mesh": {"cells": 20},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [80, 0, 0]}},
+        "initial": "equilibrium", "time": {"duration": 20}, "output": {"every": 0.5},
+    }  # fmt: skip
+    with hybrid.Simulation(scene, most_iterations=most) as cable:
+        while cable.t < 10.0:
+            t, part = cable.t + 0.2, 0.5 * min(cable.t / 4, 1) ** 2
+            cable.set_end("end", [80 + part * np.sin(0.7 * t), 0, part * np.sin(0.9 * t)])
+            cable.advance(t)
+
+
+@pytest.mark.parametrize("most", [1, 2])
+def test_nor_for_what_its_zones_want(most):
+    sets = ["time.duration=8", "output.every=0.1", "model={kind: adaptive}", "time.step=0.1"]
+    scene = hybrid.load_scene(Path("examples/touchdown.yaml"), sets)
+    with hybrid.Simulation(
+        scene, most_iterations=most, criterion=lambda x: np.where(x.s > 200, 5.0 * (x.t >= 0.95), 0.0)
+    ) as cable:
+        while cable.t < 1.5:
+            cable.step()
+        assert "grow" in {e.kind for e in cable.result().events} or "split" in {e.kind for e in cable.result().events}

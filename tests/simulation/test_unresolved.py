@@ -384,3 +384,15 @@ def test_a_rod_that_stands_still_in_compression_has_no_coarse_steps(end: dict[st
         cable_scene(rod, clamped_at([0, 0, 0], [0.3, 0.1, 1]), end, model="rod", mesh=10, time=(1.0, 0.01))
     )
     assert "coarse step" not in kinds(found)
+
+
+def test_a_sprung_clamp_is_resolved_in_a_plane_as_in_space():
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "bend_stiffness": 200.0}
+    section = {"length": 30.0, "mass": 5.0, "diameter": 0.05, "bending_stiffness": 2000.0, "damping": {"mass": 0.5}}
+    scene = {
+        "cable": {"sections": [section]}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
+        "ends": {"start": clamp, "end": {"kind": "pinned", "position": [20, 0, 0]}},
+        "time": {"duration": 0.2, "step": 0.05}, "output": {"every": 0.1},
+    }  # fmt: skip
+    said = [{e.kind for e in hybrid.run(scene | {"dimension": dimension}).events} for dimension in (2, 3)]
+    assert said[0] == said[1]

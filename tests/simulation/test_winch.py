@@ -378,3 +378,22 @@ def test_a_rope_under_friction_with_its_ends_exchanged() -> None:
     one, other = (hybrid.run(pressed(0.3, first)).lines["rope"] for first in (True, False))
     assert np.abs(one["payout/length"] - other["payout/length"]).max() < 1e-6
     assert np.abs(one.position - other.position[:, ::-1]).max() < 1e-5
+
+
+@pytest.mark.parametrize("step", [0.1, 0.05])
+def test_a_winch_goes_on_with_the_pull_behind_a_jump_of_load(step):
+    """(I + M) dc/dt = M g - T from when the thrust ends on."""
+    winch = {"tension": 80.0 * 9.81 + 200.0, "inertia": 100.0, "ramp": 1.0}
+    scene = {
+        "cable": {"sections": [{"length": 40.0, "mass": 1e-6}]},
+        "ends": {
+            "start": {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -200.0], "until": 3.0}},
+            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 90.0, "winch": winch}},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
+        "time": {"duration": 6.0, "step": step}, "output": {"every": 0.5},
+    }  # fmt: skip
+    result = hybrid.run(scene)
+    late = np.maximum(result.t - 3.0, 0.0)
+    assert np.abs(result["payout/rate"] + 200.0 / 180.0 * late).max() < 1e-4
+    assert np.abs(result["payout/length"] - 40.0 + 100.0 / 180.0 * late**2).max() < 5e-4

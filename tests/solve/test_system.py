@@ -240,3 +240,30 @@ def test_a_first_place_that_is_forgotten_at_the_origin_is_named(ship: bool) -> N
     key = "bodies.ship" if ship else "points.buoy"
     assert f"try:      {key}.initial_guess nearer: 6.71864e+06 m from points.east" in str(refused.value)
     assert "is 70 m long; else " in str(refused.value)
+
+
+@pytest.mark.parametrize("below", [False, True])
+def test_a_straight_wire_pulls_alike_whichever_way_it_is_written(below):
+    pulls = []
+    for ends in (("top", "load"), ("load", "top")):
+        section = {"length": 40.0, "mass": 1.0, "diameter": 0.02, "bending_stiffness": 10.0}
+        line = {"sections": [section], "mesh": {"cells": 20}, "model": "rod"}
+        points = {
+            "top": {"position": [0, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 3.0}, "ramp": 3.0}},
+            "load": {"kind": "free", "mass": 80.0, "volume": 0.0, "initial_guess": [0, 0, -40]},
+        }
+        lines = {"wire": {**line, "start": ends[0], "end": ends[1]}}
+        if below:
+            points["low"] = {"kind": "free", "mass": 20.0, "volume": 0.0, "initial_guess": [0, 0, -50]}
+            lines["below"] = {**line, "sections": [section | {"length": 10.0}], "mesh": {"cells": 5},
+                              "start": "load", "end": "low"}  # fmt: skip
+        else:
+            points["load"] = {"body": "box", "place": [0, 0, 0.5]}
+        scene = {"points": points, "lines": lines, "time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.25}}
+        if not below:
+            scene["bodies"] = {
+                "box": {"mass": 2000.0, "volume": 0.0, "inertia": [300] * 3, "initial_guess": [0, 0, -40.5]}
+            }
+        wire = hybrid.run(scene).lines["wire"]
+        pulls.append(wire["reaction_start" if ends[0] == "top" else "reaction_end"])
+    assert np.abs(pulls[0] - pulls[1]).max() < 1e-6 * np.abs(pulls[0]).max()

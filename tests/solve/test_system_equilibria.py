@@ -20,7 +20,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.simulation import equilibrium
 from hybrid.solve.stepper import LineFailed
 from tests.combinations.pairs import seen_by
-from tests.scenes import each_line, network_scene
+from tests.scenes import each_line, line_between, network_scene
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 LEG = {"length": 10.0, "mass": 1e-3, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
@@ -167,3 +167,18 @@ def lowest_tension(found: hybrid.Result) -> float:
     largest = max(float(line.tension.max()) for line in found.lines.values())
     assert float(found.attributes["static_residual"]) < 1e-6 * largest
     return min(float(line.tension.min()) for line in found.lines.values()) / largest
+
+
+def knot(first):
+    sec = {"length": 60, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6}
+    lines = {x: line_between(x.upper(), "K", sec, model="catenary", mesh=12) for x in "ab"}
+    points = {"A": {"position": [0, 0, 0]}, "B": {"position": [80, 0, 0]}}
+    points["K"] = {"kind": "free", "mass": 20, "initial_guess": [40, 0, -40]}
+    return network_scene(points, dict(sorted(lines.items(), reverse=first == "b")))
+
+
+def test_tension_at_a_free_point_does_not_depend_on_the_order_of_lines():
+    one, other = (hybrid.static(knot(x)).lines["a"]["tension"][0, -1] for x in "ab")
+    assert one == pytest.approx(other, rel=1e-9)
+    one, other = (hybrid.sensitivity(knot(x), ["a/tension@end"], ["lines.a.sections[0].mass"])[0] for x in "ab")
+    assert one.derivative == pytest.approx(other.derivative, rel=1e-6)

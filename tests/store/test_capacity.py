@@ -411,3 +411,12 @@ def test_numbers_that_are_none_are_refused(pretension):
         result.mooring(1e5, (1.2, 1.4), pretension)
     with pytest.raises(ResultError, match="a number in the unit of the quantity"):
         result.exceedance("end_force_end", math.nan)
+
+
+def test_a_mooring_line_uses_at_a_clump_what_the_tension_of_all_steps_is_on_either_side():
+    scene = span(time=(9.0, 0.1), output={"every": 4.5, "points": 5})
+    scene["cable"]["attachments"] = [{"kind": "clump", "at": 25, "mass": 60}]
+    scene["ends"]["end"] = pinned_at(80, 0, 0, motion={"heave": {"amplitude": 1.0, "period": 4}, "ramp": 4})
+    found = hybrid.run(scene)
+    s, _, most = found.mooring(1.0, (1.0, 1.0), 0.0)
+    assert most[s == 25.0] == pytest.approx(found["envelope/tension_max"][found["envelope/s"] == 25.0], rel=1e-12)

@@ -39,6 +39,8 @@ from hybrid.kernels.step.line_step import Limits, Task, read
 
 # --- what kernels of several lines get ---------------------------------------------------------
 
+NONE, HELD = -1, -2  # of `joints`
+
 
 class NetworkJob(NamedTuple):
     """Arguments of the entries: the lines, points and bodies of a network, and room.
@@ -49,7 +51,9 @@ class NetworkJob(NamedTuple):
     asked: NetworkTask
     tables: NumberRows  # (L, ..) jobs of the lines (kernels.run.network_run), their task ASSEMBLY
     numbers: Rows  # the same memory
-    joints: NumberRows  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
+    # (L, 2) points, then bodies, that start and end are joined to, -1: none; HELD: an end that is held where the start is
+    # joined, whose last block is left unsolved: a straight line that does not stretch has no tension of its own
+    joints: NumberRows
     fairleads: Blocks  # (L, 2, 3) m of ends at bodies, in their axes
     seats: Blocks  # (L, 2, SEAT) frames of ends that turn with bodies (kernels.junctions.joined_lines)
     arms: Blocks  # (L, 2, 3) m, worked in
@@ -318,7 +322,7 @@ def clear_right_side(network, l):
         for j in range(SIZE):
             x[i, j] = 0.0
             X_[i * ROW + j * SPAN + SPAN - 1] = 0.0
-    if network.joints[l, END] >= 0:
+    if network.joints[l, END] != NONE:
         at = last_block(X_, n)
         for j in range(SIZE):
             X_[at + 64 + j] = 0.0
@@ -341,7 +345,7 @@ def push_node(network, l, i, force):
 def eliminate_right_side(network, l):
     """Carry the right-hand side of line l through its kept factors."""
     line_job, n = read(network.tables[l]), read(network.tables[l]).line.h.shape[0]
-    o, joined, begin = network.begins[l], network.joints[l, END] >= 0, n + 1
+    o, joined, begin = network.begins[l], network.joints[l, END] != NONE, n + 1
     for i in range(n, -1, -1):
         if network.marks[o + i] != 0:
             begin = i

@@ -39,9 +39,11 @@ from hybrid.kernels.junctions.borders import (
     FAR,
     FORCE,
     FORGET,
+    HELD,
     HOLD,
     MEASURE,
     NO_NUMBERS,
+    NONE,
     RELAX,
     START,
     STRENGTH,
@@ -97,7 +99,7 @@ def count_tensions(joints):
     """How many lines hand over their last block, with the tension of its cell."""
     found = 0
     for l in range(joints.shape[0]):
-        if joints[l, END] >= 0:
+        if joints[l, END] != NONE:
             found += 1
     return found
 
@@ -123,6 +125,9 @@ def place_ends(l, job, network, given):
                 job.ends.position[k, i] = job.old.r[node, i]
                 if not given:  # as it is, -u is what it has still to go, too small to be added to a place
                     job.ends.position[k, i] += job.work.u[node, i] + gaps[l, k, i]
+        if joint == HELD:
+            for i in range(3):
+                gaps[l, k, i] = job.ends.position[k, i] - job.old.r[node, i] - job.work.u[node, i]
 
 
 @inner
@@ -171,9 +176,9 @@ def hand_over(l, job, network, cv):
             b = joints[l, k] - points
             answer_of_end(job, k, new[b], work[b], cv, answers[k])
     if start >= 0:
-        carry_start(X_, job.work.W, columns, o, n, end >= 0)
+        carry_start(X_, job.work.W, columns, o, n, end != NONE)
     if starts:
-        carry_turn(X_, job.work.W, columns, o, n, end >= 0, answers[START])
+        carry_turn(X_, job.work.W, columns, o, n, end != NONE, answers[START])
     if ends:
         carry_end_turn(X_, job.work.W, columns, o, n, answers[END])
     if start >= 0:
@@ -182,9 +187,9 @@ def hand_over(l, job, network, cv):
                 balance_of_start(job.work.rows[0], a, starts, answers[START], f)
             else:
                 moment_of_end(START, a - 3, answers[START], f)
-            carry_functional(X_, columns, parts[a], o, 0, n, end >= 0, low, high, f)
-            put_functional(f, low, high, end >= 0, S, AT[START] + a)
-    if end < 0:
+            carry_functional(X_, columns, parts[a], o, 0, n, end != NONE, low, high, f)
+            put_functional(f, low, high, end != NONE, S, AT[START] + a)
+    if end == NONE:
         return
     k = last_block(X_, n)
     for r in range(4):
@@ -330,8 +335,8 @@ def assemble_junctions(network, m):
             continue
         job = read(tables[l])
         hand_over(l, job, network, cv)
-        spread(l, job, network, tensions, row if end >= 0 else -1, m)
-        if end >= 0:
+        spread(l, job, network, tensions, row if end != NONE else -1, m)
+        if end != NONE:
             row += 1
     add_own(network, first_unknown(points, tensions, points), m, cv, ca)
 
@@ -345,8 +350,8 @@ def hand_over_right(l, job, network):
     if start >= 0:
         for a in range(6 if turns(network.seats, l, START) else 3):
             left = -job.work.rows[0, (a + 1) * 24 + 23] if a < 3 else 0.0
-            S[AT[START] + a, RIGHT] = -count_right(X_, parts[a], o, 0, n if end >= 0 else n + 1, left)
-    if end >= 0:
+            S[AT[START] + a, RIGHT] = -count_right(X_, parts[a], o, 0, n if end != NONE else n + 1, left)
+    if end != NONE:
         k = last_block(X_, n)
         for r in range(4):
             S[TENSION if r == 0 else AT[END] - 1 + r, RIGHT] = X_[k + 64 + r]
@@ -369,7 +374,7 @@ def gather_right_sides(network, m):
         if joints[l, START] < 0 and joints[l, END] < 0:
             continue
         hand_over_right(l, read(tables[l]), network)
-        if joints[l, END] >= 0:
+        if joints[l, END] != NONE:
             A[row, m] = S[TENSION, RIGHT]
             row += 1
         for k in range(2):
@@ -425,9 +430,12 @@ def correct_all(network, gaps, m):
             far = shift_of(end, tensions, points, arms[l, END], gaps[l, END], ends, A, m, q, END_TURN - 3)
             x[n, 0], x[n, 1], x[n, 2], x[n, 3] = A[row, m], far[0], far[1], far[2]
             row += 1
+        elif end == HELD:
+            x[n, 0], x[n, 1], x[n, 2], x[n, 3] = A[row, m], gaps[l, END, 0], gaps[l, END, 1], gaps[l, END, 2]
+            row += 1
         if start >= 0:
             place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
-        if not substitute(job.work.X, x, end >= 0, (columns, network.first[l], low, high, q)):
+        if not substitute(job.work.X, x, end != NONE, (columns, network.first[l], low, high, q)):
             return l
         if (
             start >= 0

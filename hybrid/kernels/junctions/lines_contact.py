@@ -59,6 +59,7 @@ from hybrid.kernels.junctions.borders import (
     COUPLE,
     END,
     NO_SOLUTION,
+    NONE,
     PREDICT,
     SAFE_PART,
     answer_right_sides,
@@ -327,7 +328,7 @@ def set_right_side(network, l, contact, first, touches, exactly):
     """
     clear_right_side(network, l)
     line_job = read(network.tables[l])
-    work, n, joined = line_job.work, line_job.line.h.shape[0], network.joints[l, END] >= 0
+    work, n, joined = line_job.work, line_job.line.h.shape[0], network.joints[l, END] != NONE
     begin = first_in_contact(contact, first, n) if touches else n + 1
     for i in range(begin, n + 1):
         if contact.marks[first + i] != 0:

@@ -67,7 +67,7 @@ def sharpest_in_plane(line, ends, e, T, a1, strains):
             weight = 2.0
             if T[c] > 0.0 and here * here * T[c] > stiffness:
                 weight = CLAMP * here * math.sqrt(T[c] / stiffness)
-            x *= weight
+            x *= weight * 0.5 * line.h[c] / line.hn[i]  # of a clamp with an angular spring the part of the cell
         if not x <= bend:
             bend, at = x, i
     return bend, at, 0.0, -1

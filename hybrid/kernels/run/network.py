@@ -31,6 +31,7 @@ from hybrid.kernels.junctions.borders import (
     BEFORE_MARCH,
     END,
     FORCE,
+    NONE,
     PREDICT,
     START,
     ask,
@@ -122,7 +123,7 @@ def march_lines(network, steps):
             wind(job)
         outcome, _, _, where = call_solver(network.solver, tables[l])
         # the last block is not solved yet; forces of a line alone are known whatever its equations are
-        known = joints[l, END] >= 0 and where == n
+        known = joints[l, END] != NONE and where == n
         if network.asked.what == ASSEMBLY and joints[l, START] < 0 and joints[l, END] < 0:
             known = job.work.report[RESIDUAL] < math.inf
         if outcome != OK and not (outcome == SINGULAR and known):

@@ -318,7 +318,8 @@ def judge(steps, network):
     clock, counts = steps.clock, steps.counts
     dt, outcome = clock.try_end - clock.now, counts.outcome
     if outcome == OK:
-        if counts.controlled and not passes(clock, counts, dt, error_ratio(network.tables, network.allowed)):
+        wrong = counts.controlled and not passes(clock, counts, dt, error_ratio(network.tables, network.allowed))
+        if wrong and not 0 < counts.most_iterations <= counts.taken:  # else no iteration is left for a shorter one
             counts.cut_by_error += 1
             give_up(steps)
             return 0
@@ -410,9 +411,10 @@ def accept(steps, network):
     counts.notices = flags
 
 
-@inner
-def renew_ended(steps):
+@kernel(inlined=False)
+def renew_ended(table):
     """After a step that was shortened: accelerations of lines that share no end with others, as of one line."""
+    steps = read_steps(table)
     clock, counts = steps.clock, steps.counts
     if counts.repeats > 0:
         network = read_network(steps.even)
@@ -420,6 +422,7 @@ def renew_ended(steps):
             if network.joints[l, 0] < 0 and network.joints[l, 1] < 0:
                 job = read(network.tables[l])
                 renew_accelerations(job.line, job.new if counts.parity else job.old, clock.until - clock.begin)
+        counts.repeats = 0
 
 
 @inner
@@ -446,7 +449,7 @@ def between_steps(steps, table):
             return PAUSED
         counts.phase = TRY
         if counts.controlled or clock.now >= clock.until:
-            renew_ended(steps)
+            renew_ended(table)
             counts.phase = BEGIN_STEP
     if counts.phase == BEGIN_STEP:
         if not clock.now < clock.stop:

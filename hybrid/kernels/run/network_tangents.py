@@ -50,7 +50,7 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
     rotation,
 )
-from hybrid.kernels.junctions.borders import END, answer_right_sides, hand_on, read_network, task_of
+from hybrid.kernels.junctions.borders import END, NONE, answer_right_sides, hand_on, read_network, task_of
 from hybrid.kernels.junctions.borders import START as BEGIN
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
@@ -317,7 +317,7 @@ def answer_joined(network, net, p):
     own = read_bodies(net.bodies[p])
     for j in range(network.tables.shape[0]):
         job = read_job(net.lines[net.joined[j]])
-        starts, ends = network.joints[j, BEGIN] >= 0, network.joints[j, END] >= 0
+        starts, ends = network.joints[j, BEGIN] >= 0, network.joints[j, END] != NONE
         set_right_side(job.work, job, read_other(job.tables[p]), starts, ends)
     if network.right.shape[0] > 0:
         own_right_sides(network, net, p)

@@ -303,7 +303,7 @@ def end_tension(line, ends, state, report, loaded, marks, k):
     """Tension at an end: the force of what holds or loads it along the tangent; beside a body, that of the cable."""
     n = line.h.shape[0]
     first, second = k * (n - 1), second_cell(line.h, marks, k)
-    if loaded[k] and (ends.held[k] == 1 or not line.element[k * n]):  # a support bears the body as well
+    if loaded[k] and (ends.held[k] == 1 or (ends.held[k] == 0 and not line.element[k * n])):  # a support bears it, too
         return beyond(state.T, line.h, first, second)
     d, _, _ = chord(get3(state.e, first))
     d2, _, _ = chord(get3(state.e, second))
