@@ -154,5 +154,5 @@ class NodeChanges(Remesh):
 
 def is_plain(line: Line) -> bool:
     """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
-    laws = "torsion", "tension_twist", "law", "bend_law", "slip_law", "wake_law", "moved"
+    laws = "torsion", "tension_twist", "law", "slip_law", "wake_law", "moved"
     return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS
