@@ -18,6 +18,9 @@ from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.store.reader import Result
 from hybrid.zones import change as zone_changes
+from tests.combinations.pairs import FEATURES, SECTION
+from tests.problems import tables_with
+from tests.scenes import cable_scene, pinned_at
 
 BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("end_force_start", "end_force_end")
@@ -215,3 +218,28 @@ def test_error_goes_on_across_changes_of_zones(name: str) -> None:
     ratio = result["errors/model/position"].max(axis=1)[clear] / true[clear]
     assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
     assert np.percentile(ratio, 5) > 0.6 and np.percentile(ratio, 95) < 1.8
+
+
+@pytest.mark.parametrize("every", [0.02, 0.03])
+def test_obstacles_that_move_through_changes_of_cells(every: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces on them, their work and what is booked are those of a new solver: outputs do not leave them elsewhere."""
+    moved = {"travel": {"by": [-4, 0.5, 0], "over": 0.8}}
+    scene = cable_scene(
+        SECTION, pinned_at(0, 0, 0), pinned_at(11, 0, 3, motion=moved), gravity=9.81, contact={"self": False},
+        model={"kind": "adaptive", "curvature_error": 0.1}, mesh=24, time=(0.8, 0.02), output=(every, 25),
+    )  # fmt: skip
+    scene = tables_with(scene, FEATURES["obstacle that moves"][0])
+    found = []
+    for may_change in (CellChanges.may_change, lambda *_: False):
+        monkeypatch.setattr(CellChanges, "may_change", may_change)
+        found.append(hybrid.run(scene))
+    for name in (
+        "obstacles/pipe/force",
+        "work/obstacles",
+        "work/contact",
+        "work/friction",
+        "work/zones",
+        "work/scheme",
+    ):
+        one, other = (x[name] for x in found)
+        np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(other).max(), err_msg=name)

@@ -19,7 +19,8 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale,
 from hybrid.kernels.laws.axial_law import stretch_energy
 from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
-from hybrid.kernels.laws.obstacles import stored_in_contact
+from hybrid.kernels.laws.obstacle_grip import grip_obstacles
+from hybrid.kernels.laws.obstacles import carry_obstacles, stored_in_contact
 from hybrid.kernels.laws.seabed import lie_in_soil
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.laws.water import wave_kinematics
@@ -318,6 +319,11 @@ def after_forces(table):
         for i in range(job.sea.bed.shape[0]):
             for j in range(3):
                 job.old.bed[i, j] = job.sea.bed[i, j]
+        if job.line.moved.shape[0] > 0:
+            grip_obstacles(job.line, job.sea, job.work.u, job.old, job.old.grip, job.old.grip)
+            for i in range(job.new.grip.shape[0]):  # a run goes on from either
+                for k in range(job.new.grip.shape[1]):
+                    job.new.grip[i, k] = job.old.grip[i, k]
     job.books.clock.stored = report[SEABED_ENERGY]
 
 
@@ -390,6 +396,8 @@ def begin_switch(table):
     job = read_switch(table)
     transfer = job.transfer
     line = transfer.line
+    if line.moved.shape[0] > 0:  # an output, or a try, has moved obstacles elsewhere, and none moves in a change
+        carry_obstacles(job.numbers[TIME], job.numbers[TIME], job.sea)
     make_stiffness(line, job.zones)  # a step that was refused has left others
     for c in range(line.h.shape[0]):
         line.h[c] = job.zones.lengths[c]
