@@ -319,7 +319,14 @@ def test_a_history_that_only_rises_is_a_half_cycle() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", ["D", {"kind": "S-N", "log_a": 12.0, "m": -3.0}, {"kind": "x", "log_a": 1.0, "m": 3.0}, {"a": 1}]
+    "wrong",
+    [
+        "D",
+        {"kind": "S-N", "log_a": 12.0, "m": -3.0},
+        {"kind": "x", "log_a": 1.0, "m": 3.0},
+        {"kind": "S-N", "log_a": 12.0, "m": 3.0, "m2": 5.0, "knee": 1e7},
+        {"a": 1},
+    ],
 )
 def test_wrong_curves_are_refused(wrong: object) -> None:
     with pytest.raises(ResultError):
