@@ -354,7 +354,7 @@ def _moored(
     k, doubt = int(most.argmax()), doubt_of(result, "tension")
     text = (
         f"mooring line by DNV-OS-E301 (2021), factors {', '.join(f'{x:g}' for x in factors)}, strength {strength:g} N: "
-        f"{100.0 * most[k]:.4g} % used at s = {s[k]:.5g} m, of the largest tension of every step and output"
+        f"{100.0 * most[k]:.4g} % used at s = {s[k]:.5g} m, of the largest tension at output points at every step"
     )
     text += "" if doubt is None else f"; {doubt.text}"
     return {"s": float(s[k]), "used": float(most[k]), "text": text, "not_verified": "" if doubt is None else doubt.text}

@@ -151,7 +151,9 @@ def in_motion(asked: Scene, of: Sequence[str], by: Sequence[str]) -> Slopes:
     not those of the base run.
     """
     refuse_edges(asked, of)
-    wanted, course = [parse_wanted(asked, x, moves=True) for x in of], course_of(asked)
+    wanted = [parse_wanted(asked, x, moves=True) for x in of]
+    at = {name: [x.at for x in wanted if x.line == k and x.at is not None] for name, k in asked.form.names.items()}
+    course = course_of(asked)._replace(places=at)
     numbers = {key: number_of(asked, key) for key in by}
     sizes = {key: size_of(asked, key, number) for key, number in numbers.items()}
     apart: dict[str, str] = {}  # why tangents are not known

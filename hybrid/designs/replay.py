@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,13 +40,15 @@ class Course(NamedTuple):
     """How a run is replayed: how finely each line is computed, by name in the network, with places of its nodes.
 
     scene: as it was computed: models of lines are those which the run has chosen; dimension: of its network, 3: no
-    plane of a line is known, which other numbers may move; tolerance: of Newton's method in steps.
+    plane of a line is known, which other numbers may move; tolerance: of Newton's method in steps; places: that are
+    added to the lists of output points that the scene has, infinite: the end.
     """
 
     scene: Any
     lines: Mapping[str, Resolution]
     dimension: int | None = 3
     tolerance: float = SOLVED_TO
+    places: Places = MappingProxyType({})
 
     def resolutions(self, finer: bool) -> Mapping[str, Resolution]:
         """How finely lines are computed; finer: on cells and in steps half as long."""
@@ -61,7 +64,13 @@ class Course(NamedTuple):
         network = made.with_lines({name: {"model": x.model} for name, x in self.scene.lines.items()})
         if scene.output.errors:  # lines pass each other as where these are estimated
             network = passing_each_other(network)
-        return network.model_copy(update={"dimension": self.dimension})
+        points = {name: network.output.points_of(name) for name in network.lines}
+        for name, more in self.places.items():
+            if not isinstance(points[name], int):
+                most = network.lines[name].cable.length
+                points[name] = tuple(np.unique([*points[name], *(min(x, most) for x in more)]).tolist())
+        output = network.output.model_copy(update={"points": points})
+        return network.model_copy(update={"dimension": self.dimension, "output": output})
 
 
 def course_of(scene: Any) -> Course:

@@ -275,7 +275,9 @@ def _places(part: Part, bends: Bends, asked: Sequence[float]) -> dict[float, str
     """Arc lengths (m) in their order, and why each is there."""
     s, result = bends.s, part.result
     largest = np.ptp(_about_main_axis(bends.vectors)[0], axis=0)
-    found = [(s[0], "start"), (s[-1], "end")]
+    ends = _ends(part)
+    found = [(s[0], "start" if s[0] in ends else "first output point")]
+    found += [(s[-1], "end" if s[-1] in ends else "last output point")]
     if "touchdown" in result:
         edges, length = part.array("touchdown"), s[-1] - s[0]
         for k in (0, 1):
@@ -304,11 +306,19 @@ def _about_main_axis(bends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 # ---- what -----------------------------------------------------------------------------------------
 
 
+def _ends(part: Part) -> dict[float, str]:
+    """Names of end forces by the arc lengths, m, of those ends that are among the output points."""
+    zones, s = part.zones[0], part.s
+    near = 1e-9 * zones[-1].s_b
+    found = {s[0]: "end_force_start"} if s[0] <= zones[0].s_a + near else {}
+    return found | ({s[-1]: "end_force_end"} if s[-1] >= zones[-1].s_b - near else {})
+
+
 def _series_at(part: Part, bends: Bends, s: float, place: str) -> list[Series]:
     """End force or tension, and curvature, at one place; of two values the one that has the larger range."""
     result, times = part.result, part.times
     series = []
-    end_force = {part.s[0]: "end_force_start", part.s[-1]: "end_force_end"}.get(s, "")
+    end_force = _ends(part).get(s, "")
     if end_force and f"steps/{end_force}" in result and len(part.array("steps/t")) > 2:
         basis = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
         series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), basis))

@@ -251,7 +251,7 @@ def _on_obstacles(
             ways = np.cross(axis, r[i] - carried[k, ENDED : ENDED + 3])
             shift.add(places, np.full((i.size, 1), first + sheaves.index(k)), -ways[:, :, None])
         shifts = shift.matrix(3 * i.size, size)
-        rubs = bool(sticks and rows[k, MU] > 0.0 and (body >= 0 or k in sheaves))
+        rubs = bool(sticks and rows[k, MU] > 0.0)
         travel = np.full(i.size, rows[k, SLIP] if rubs else 0.0)
         depth = 0.5 * rows[k, ONSET_OF] - gaps[k, i]
         yield Touch(

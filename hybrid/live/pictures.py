@@ -24,7 +24,7 @@ from hybrid.view.curves import along, even
 from hybrid.view.figure import BED, BODY, INK, colour_of
 from hybrid.view.lines import LINE_COLOURS, AllLines, arms_of, bodies_of, box_and_planes, marked_on, points_of
 from hybrid.view.projections import bed_heights, rings, whole_zones
-from hybrid.view.summary import facts_of
+from hybrid.view.summary import facts_of, length_of
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
 LEAST_POINTS, MOST_POINTS = 101, 401
@@ -148,10 +148,15 @@ def around(result: Result) -> dict[str, Any]:
 
 
 def heads(result: Result) -> list[dict[str, Any]]:
-    """What stays the same of each line: its name, colour and length (m)."""
+    """What stays the same of each line: its name, colour and from and to which arc length (m) it is drawn."""
     named = dict(zip(result.lines, cycle(LINE_COLOURS), strict=False))
     return [
-        {"name": name, "colour": named.get(name, ""), "length": float(np.ptp(line.s))}
+        {
+            "name": name,
+            "colour": named.get(name, ""),
+            "begin": min(float(line.s[0]), 0.0),
+            "length": max(float(line.s[-1]), length_of(line)),
+        }
         for name, line in result.each_line()
     ]
 
@@ -236,8 +241,10 @@ def _marks(result: Result, outputs: list[int]) -> list[list[dict[str, Any]]]:
         mark("float, clump, body", "circle", BODY, attached)
     if touchdown is not None:
         mark("touchdown", "diamond", BED, touchdown)
-    if not points:
+    zones = line.zones[outputs[0]]
+    if not points and line.s[0] <= zones[0].s_a:
         mark("start (s = 0)", "square", INK, position[:, :1])
+    if not points and line.s[-1] >= zones[-1].s_b * (1.0 - 1e-9):
         mark("end", "diamond", INK, position[:, -1:])
     return out
 

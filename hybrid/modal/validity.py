@@ -20,8 +20,16 @@ from hybrid.kernels.laws.axial_law import DYNAMIC, STRAIN, TENSION
 from hybrid.kernels.laws.bending_law import EACH, PER_TENSION, STIFF, TABLE_MOMENT
 from hybrid.kernels.laws.bending_law import TABLE_MOMENT as SLIPS_AT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
-from hybrid.kernels.laws.seabed import DEPTH, PRESSES, STEEP, SUCTION, planes_under
-from hybrid.kernels.state.report import OBSTACLES, SEABED, SOIL
+from hybrid.kernels.laws.seabed import (
+    DEPTH,
+    PRESSES,
+    STEEP,
+    SUCTION,
+    normal_forces,
+    planes_under,
+    soil_at_rest,
+)
+from hybrid.kernels.state.report import FRICTION, OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.loaded_line import STRAIGHT, LoadedLine, LoadedMembers, current_at
 from hybrid.linear.matrices import LinearNetwork, pulls
@@ -55,7 +63,8 @@ FEW_PLACES = 0.05
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
-    for doubt in (_slack, _swing, _kinks, _layers, _soil, _touchdown, _on_obstacles, _left_out, _shape, _hardly_known):
+    contact = _soil, _touchdown, _on_bed, _on_obstacles
+    for doubt in (_slack, _swing, _kinks, _layers, *contact, _left_out, _shape, _hardly_known):
         yield from doubt(x, found)
 
 
@@ -90,7 +99,8 @@ def _swing(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     held = all(x.x.joints[k] >= 0 or x.x.ends.held[k] for k in (0, 1))  # a free end gives way
     if held and compliance > 0.0:
         pull = 0.5 * float((square * l).sum()) / compliance
-        at = int(deviation.argmin())
+        varies = deviation >= OF_LARGEST * deviation.max()  # friction may hold the rest
+        at = int(np.where(varies, deviation, np.inf).argmin())
         if pull > STRETCH * deviation[at]:
             yield (
                 f"swinging alone stretches the line, which would take {pull:.3g} N in the mean where the standard "
@@ -176,6 +186,32 @@ def _touchdown(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     normals, depths = planes_under(x.sea, found.mean_position)
     way = np.einsum("fni,ni->fn", found.position, normals)
     yield from _crossing(x, 0.5 * x.sea.onset - depths, way, "the bed")
+
+
+def _on_bed(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """What of the line slides on the bed, where friction sticks in the response."""
+    line, r = x.linear.line, found.mean_position
+    if not (line.bits & SEABED and line.bits & FRICTION and x.sea.friction.any()):
+        return
+    force = np.zeros(len(r))
+    if line.bits & SOIL:
+        soil_at_rest(line, x.sea, r, np.zeros_like(x.linear.state.soil), force, np.zeros((len(r), 2)))
+    else:
+        normal_forces(line, x.sea, r, force)
+    n, _ = planes_under(x.sea, r)
+    way = found.position - np.einsum("fni,ni->fn", found.position, n)[:, :, None] * n
+    parts = np.sqrt(2.0 * (np.abs(way) ** 2).sum(axis=(0, 2))) / x.sea.slip_length
+    # what friction would have to bear, over what it can: the part of the contact that slides before the rest bears it
+    share = float(force @ parts / max(float(force.sum()), 1e-300))
+    if share > OPENS and (parts[force > 0.0] > 1.0).any():
+        yield _slides("the line and the bed", min(share, 1.0))
+
+
+def _slides(name: str, share: float) -> str:
+    return (
+        f"contact of {name} slides where {100.0 * share:.0f} % of its force are borne, and sticks here; "
+        "without friction (--smooth) it slides freely, hybrid run has both"
+    )
 
 
 def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
@@ -285,10 +321,7 @@ def touching_doubts(touch: Touch, name: str, moved: Any) -> Iterator[str]:
         slides = touch.travel < 2.0 * np.linalg.norm(ways, axis=1)
         share = float(touch.force[slides].sum() / touch.force.sum())
         if share > OPENS:
-            yield (
-                f"contact of {name} slides where {100.0 * share:.0f} % of its force are borne, and sticks here; "
-                "without friction (--smooth) it slides freely, hybrid run has both"
-            )
+            yield _slides(name, share)
 
 
 def _deviation(amplitudes: Any) -> Floats:

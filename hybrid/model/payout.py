@@ -261,7 +261,7 @@ def payout_plan(
         return None
     length, duration = scene.length, scene.time.duration if scene.time is not None else 0.0
     side, where = winch_side(scene), winch_at(scene)
-    law = law_of(payout, length, duration, where)
+    law = law_of(payout, length, where)
     low, high = extremes(law, length, duration)
     longest = max(high, payout.longest or 0.0)
     if payout.longest is not None and high > payout.longest:
@@ -403,7 +403,7 @@ def longest_out(scene: LineScene) -> float:
     payout = payout_of(scene)
     if payout is None or scene.time is None:
         return scene.length
-    law = law_of(payout, scene.length, scene.time.duration, winch_at(scene))
+    law = law_of(payout, scene.length, winch_at(scene))
     high = extremes(law, scene.length, scene.time.duration)[1]
     return max(high, payout.longest or 0.0)
 
@@ -478,17 +478,17 @@ def _rows(rows: list[tuple[float, list[float]]]) -> Floats:
     return out
 
 
-def law_of(payout: Payout, length: float, duration: float, where: str = "payout") -> Floats:
+def law_of(payout: Payout, length: float, where: str = "payout") -> Floats:
     """The length, m, that is out over time, as polynomials: (K, 8) as of kernels.reel.payout.Reel.
 
-    length: m, at t = 0; duration: s, of the motion; where: the key in the scene, for messages.
+    length: m, at t = 0; where: the key in the scene, for messages.
     """
     if payout.rate is not None:
         return _law_of_rate(payout, length)
     if payout.file is not None:
         payout = payout.model_copy(update=_rows_of(payout.file, length, where))
     if payout.rates is not None:
-        return _law_of_rates(np.array(payout.rates, float), length, duration)
+        return _law_of_rates(np.array(payout.rates, float), length)
     if payout.lengths is not None:
         return _law_of_lengths(np.array(payout.lengths, float), length, where)
     return _rows([(0.0, [length])])
@@ -543,12 +543,12 @@ def _law_of_rate(payout: Payout, length: float) -> Floats:
     return _rows(rows)
 
 
-def _law_of_rates(table: Floats, length: float, duration: float) -> Floats:
+def _law_of_rates(table: Floats, length: float) -> Floats:
     """Rates at times, a cubic spline between them; beyond the last it is constant."""
     from scipy.interpolate import CubicSpline  # slow to import
 
     t, c = table.T
-    spline = CubicSpline(t, c, bc_type=("natural", (1, 0.0) if t[-1] < duration else "natural"))
+    spline = CubicSpline(t, c, bc_type="natural")
     way = spline.antiderivative()
     rows = [(float(x), [*a[:-1].tolist(), float(a[-1]) + length]) for x, a in zip(way.x, way.c.T, strict=False)]
     return _rows([*rows, (float(t[-1]), [float(c[-1]), float(way(t[-1])) + length])])

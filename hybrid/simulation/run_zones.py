@@ -326,6 +326,8 @@ class RunZones(Part):
         for x in self.lines:
             x.pending = None
         self._change(changes)
+        if changes and all(x.cells is not None for x, _ in changes):
+            self._run.loop.pull_anew()
 
     def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
         """Carry out changes of lines, in their arrays where that can be."""

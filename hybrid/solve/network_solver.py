@@ -25,6 +25,7 @@ from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.run.network import JUNCTIONS, begin_line, book_network_step
 from hybrid.kernels.run.newton import ONE_MARCH, solve_network, workspace_of
 from hybrid.kernels.state.report import (
+    AXIAL_LAW,
     FRICTION,
     LOCAL_ERROR,
     NET_A,
@@ -53,6 +54,7 @@ BALANCED, BALANCING = 1e-6, 4
 # Where lines touch Newton goes on once unless this many times the residual balances, too: a ball on lines that lie on
 # others was 3e-7 m away from where it rests, and lines on one that is held bore 1e-5 more than its weight.
 CLOSER = 100.0
+ROUNDED = 1e-14  # what round-off may leave of a strain
 DRIFTED = 10.0  # lengths that a line has gone from its start where it has drifted
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
 NEUTRAL = 1e-6
@@ -518,7 +520,7 @@ class NetworkSolver(LineJobs):
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
             proof = self.proof(new)
             taken, touches = replace(taken, residual=proof), lies or self.in_contact()
-            if not self.is_balanced(new, proof):
+            if not self.is_balanced(new, max(proof, self._unstretched(new))):
                 taken = replace(taken, outcome=Outcome.NOT_CONVERGED)
             elif kept is not None or (not rubs and (not touches or self.is_balanced(new, CLOSER * proof))):
                 break
@@ -528,6 +530,17 @@ class NetworkSolver(LineJobs):
             taken, new = kept
             self.proof(new)
         return taken, new
+
+    def _unstretched(self, states: NetworkState) -> float:
+        """Largest force (N) by which a tension is not that of its stretched cell, which a motion would begin with."""
+        worst = 0.0
+        for x, state in zip(self.lines, states.lines, strict=True):
+            if not (x.line.bits & AXIAL_LAW or x.line.tension_twist.size):
+                give = x.line.ck > 0.0
+                stretched = np.linalg.norm(state.e, axis=1)[give] / x.line.h[give] - 1.0
+                left = np.abs(stretched - x.line.ck[give] * state.T[give]) - ROUNDED
+                worst = max(worst, float((left / x.line.ck[give]).max(initial=0.0)))
+        return worst
 
     def newton_round(self, states: NetworkState, turning: bool = False) -> NetworkTaken:
         """Static Newton from states at rest, which it overwrites; turning: whether chords are turned.

@@ -22,6 +22,7 @@ from hybrid.kernels.run.network_run import (
     LINE,
     REGROUP,
     blank_steps_job,
+    pull_anew,
     renew_ended,
     run_lines,
     run_network,
@@ -270,6 +271,10 @@ class NetworkSteps:
         """As many steps as interrupts and progress can wait for; most: as far as Python knows what they cost."""
         cost = max(self._cells, 1) * (1.0 + self._waves / WAVES_OF_A_CELL)
         self.counts.quota = max(1, min(ROWS, most, int(CELL_STEPS / cost)))
+
+    def pull_anew(self) -> None:
+        """Bodies feel lines whose cells have changed in place."""
+        pull_anew(self._job.numbers)
 
     def go(self) -> int:
         """Go on until a code of kernels.state.books."""

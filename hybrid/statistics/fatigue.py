@@ -97,7 +97,8 @@ def curve_of(given: str | Mapping[str, float | str] | Curve) -> Curve:
     second = {name: getattr(curve, name) for name in ("log_a2", "m2", "knee")}
     if len(missing := [name for name, x in second.items() if not math.isfinite(x)]) in (1, 2):
         raise ResultError(
-            f"a curve of fatigue without {', '.join(missing)}\n    expected: log_a2, m2 and knee of a second slope, or none of them"
+            f"a curve of fatigue without {', '.join(missing)}\n"
+            "    expected: log_a2, m2 and knee of a second slope, or none of them"
         )
     slopes = [curve.m] + ([curve.m2] if math.isfinite(curve.knee) else [])
     if curve.kind not in ("S-N", "T-N") or not all(0.0 < m <= LARGEST_SLOPE for m in slopes):

@@ -109,6 +109,15 @@ def inside_of(a: float, b: float, s: Floats) -> np.ndarray:
     return (s >= a - near) & (s <= b + near) & ~late & ~early
 
 
+def shows_ends(result: StoredResult) -> bool:
+    """Whether output points reach from end to end of the line."""
+    if not len(result.zones):
+        return True
+    zones = result.zones[-1]
+    near = NEAR * max(zones[-1].s_b, 1.0)
+    return bool(result.s[0] <= zones[0].s_a + near and result.s[-1] >= zones[-1].s_b - near)
+
+
 def bound_of_steps(result: StoredResult, errors: tuple[float, float] = (0.0, 0.0)) -> float | None:
     """Upper bound of the utilisation of capacity over all steps and nodes.
 
@@ -159,8 +168,11 @@ def mooring_use(
             raise ResultError("mooring\n    expected: a pretension in N, 0 or more, or the equilibrium that has it")
         before = np.full(s.shape, float(pretension))
     else:
-        if pretension.lines or abs(float(pretension.s[-1] - result.s[-1])) > 1e-6 * float(result.s[-1] - result.s[0]):
+        near = 1e-6 * float(result.s[-1] - result.s[0])
+        if pretension.lines or abs(float(pretension.s[-1] - result.s[-1])) > near:
             raise ResultError("mooring\n    expected: the pretension of the same line, or a number in N")
+        if float(pretension.s[0]) > max(float(result.s[0]), pretension.zones[-1][0].s_a) + near:
+            raise ResultError("mooring\n    expected: a pretension at all output points of the result")
         there, tension = pretension.both_sides("tension")
         before = tension[0] if np.array_equal(there, s) else _along(s, there, tension[0])
     most = T.max(axis=0)
@@ -417,6 +429,8 @@ def code_of_steps(result: StoredResult, errors: Mapping[str, float] | None = Non
         result, f"{GROUP}/%s_max", lambda x: result[x] + error(x.removeprefix(f"{GROUP}/").removesuffix("_max"))
     )
     if moment is None or not has_envelope(result) or any(name not in result for name in names):
+        return None
+    if not shows_ends(result):  # beyond them heights are not known
         return None
     s, low, high = np.asarray(result[SCALE]), result[names[0]] - error("tension"), result[names[1]] + error("tension")
     z = result.position[:, :, 2]

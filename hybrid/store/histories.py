@@ -17,7 +17,7 @@ from hybrid.errors import ResultError
 from hybrid.statistics import extremes, moments
 from hybrid.statistics.moments import STEADY, mean_over_time
 from hybrid.store.records import ALIASES
-from hybrid.store.stored_result import StoredResult
+from hybrid.store.stored_result import TURNS, StoredResult
 
 Floats = np.ndarray
 Window = tuple[float | None, float | None]
@@ -102,6 +102,8 @@ def history_of(result: StoredResult, name: str, times: Window | None = None, at:
     values = np.asarray(values)[inside]
     if component is not None:
         values = values[..., component]
+    if stored in TURNS:
+        values = np.unwrap(values, axis=0)
     return History(name, result.units[stored], t[inside], values, s, basis)
 
 
@@ -153,7 +155,7 @@ def _at_places(result: StoredResult, name: str, s: Floats, values: Floats, at: F
     """Arc lengths and values (nt, n, ...) at places, of which those where the quantity jumps come twice."""
     columns, places = [], []
     for x in at:
-        exact = np.flatnonzero(np.abs(s - x) <= 1e-9 * np.ptp(s)) if np.ptp(s) > 0.0 else np.zeros(1, int)
+        exact = np.flatnonzero(np.abs(s - x) <= 1e-9 * np.ptp(s))
         found = values[:, exact] if exact.size else np.asarray(result.at(s=[x], names=[name], side="left")[name])
         columns.append(found)
         places += [x] * found.shape[1]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.store.capacity import CODE_NAME as CODE_USED
-from hybrid.store.capacity import F201, NAME, bound_of_steps, code_of_steps, mooring_of_steps, rows_of
+from hybrid.store.capacity import F201, NAME, bound_of_steps, code_of_steps, mooring_of_steps, rows_of, shows_ends
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
 from hybrid.store.envelope import (
     NOT_VERIFIED,
@@ -82,8 +82,8 @@ def _about(nodes: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
     order = np.argsort(at, kind="stable")
     values = np.concatenate([x[known], np.interp(s, nodes[known], x[known])])[order]
     first, last = (np.searchsorted(at[order], s, side) for side in ("left", "right"))
-    between = np.array([values[a:b].max() for a, b in zip(first[:-1], last[1:], strict=True)])
-    return np.maximum(np.append(between, -np.inf), np.insert(between, 0, -np.inf)) if between.size else values[:1]
+    before, behind = np.append(0, first[:-1]), np.append(last[1:], values.size)  # about the last ones all that is there
+    return np.array([values[a:b].max() for a, b in zip(before, behind, strict=True)])
 
 
 # Attribute of a result: errors of its extremes over all steps, by name: of a limit of sections, as `part_used`; of
@@ -255,8 +255,9 @@ def _part_of(
     if np.isnan(value).all():
         return None
     k, bound = int(np.nanargmax(value)), bound_of(result)
-    open_ = len(result.times) > 1 and (bound is None or bound > 1.0)
-    at_most = 100.0 * bound if open_ and bound is not None else None
-    return Held(
-        name, limit, "%", float(value[k]), 100.0, bool(value[k] > 100.0), float(t[k]), float(s[k]), open_, bound=at_most
-    )
+    beyond = bound is None or bound > 1.0
+    if len(result.times) == 1:  # nodes alone are between outputs
+        beyond = not value[k] > 100.0 and (not shows_ends(result) if bound is None else beyond)
+    at_most = 100.0 * bound if beyond and bound is not None else None
+    worst = float(value[k])
+    return Held(name, limit, "%", worst, 100.0, worst > 100.0, float(t[k]), float(s[k]), beyond, bound=at_most)

@@ -100,6 +100,10 @@ class Columns(Mapping[str, np.ndarray]):
         return f"<{self._result.describe(self._group)}>"
 
 
+# Angles that are cut at half a turn.
+TURNS = ("phi", "right/phi")
+
+
 class StoredResult:
     """What is stored of one run, and nothing that follows from it: arrays, zones, events, lines, status."""
 
@@ -258,7 +262,8 @@ class StoredResult:
                 found = self._at_places(name, dims.index("s"), s, side)
             for key, array in found.items():
                 along = t is not None and "t" in dims
-                answer[key] = _interpolate(array, dims.index("t"), self["t"], t, "t", "s") if along else array
+                turns = key in TURNS
+                answer[key] = _interpolate(array, dims.index("t"), self["t"], t, "t", "s", turns) if along else array
         return answer
 
     at = values_at
@@ -267,7 +272,7 @@ class StoredResult:
         """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""
         right, grid = right_of(self._known(name)), self["s"]
         if right not in self._dims or name == "s":
-            return {name: _interpolate(self[name], axis, grid, s, "s", "m")}
+            return {name: _interpolate(self[name], axis, grid, s, "s", "m", name in TURNS)}
         x, jumps = np.asarray(s, dtype=float), self["right/s"]
         which = np.abs(x[..., None] - jumps).argmin(axis=-1)
         exact = np.abs(x - jumps[which]) <= 1e-9 * (grid[-1] - grid[0])
@@ -275,7 +280,7 @@ class StoredResult:
         doubled, values = self.both_sides(name)
         doubled[np.searchsorted(doubled, jumps, side="right") - 1] = behind
         found = {
-            key: _interpolate(values, axis, doubled, np.where(exact, at[which], x), "s", "m")
+            key: _interpolate(values, axis, doubled, np.where(exact, at[which], x), "s", "m", name in TURNS)
             for key, at in (("left", jumps), ("right", behind))
         }
         if side is None and exact.any():
@@ -445,7 +450,10 @@ def _dataset(contents: Contents, name: str) -> Any:
     return data
 
 
-def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:
+def _interpolate(
+    array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str, turns: bool = False
+) -> Any:
+    """turns: angles from -pi to pi, between which it is the short way."""
     x = np.asarray(where, dtype=float)
     if len(grid) == 0:
         raise ResultError(f"the result holds no output yet, so nothing at {dim} = {where} {unit}")
@@ -464,7 +472,11 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
     width = grid[right] - grid[left]
     weight = np.clip((x - grid[left]) / np.where(width > 0, width, 1.0), 0.0, 1.0)
     weight = weight.reshape(weight.shape + (1,) * (array.ndim - axis - 1))
-    return np.take(array, left, axis) * (1.0 - weight) + np.take(array, right, axis) * weight
+    a, b = np.take(array, left, axis), np.take(array, right, axis)
+    if turns:
+        b = b - 2.0 * np.pi * np.rint((b - a) / (2.0 * np.pi))
+    between = np.where(weight == 0.0, a, np.where(weight == 1.0, b, a * (1.0 - weight) + b * weight))
+    return between - 2.0 * np.pi * np.rint(between / (2.0 * np.pi)) if turns else between
 
 
 def _current(name: str) -> str:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import AS_MUCH, EVENTS_BY_WEIGHT, IN_SPACE, KINK_COUNTS, OF_AN_END
-from hybrid.store.capacity import bound_of_steps, bound_with_errors, code_of_steps, code_with_errors
+from hybrid.store.capacity import bound_of_steps, bound_with_errors, code_of_steps, code_with_errors, shows_ends
 from hybrid.store.envelope import (
     BROKEN,
     GROUP,
@@ -344,7 +344,10 @@ def _reached(result: StoredResult, name: str, x: Judged) -> Doubt | None:
     allowed = _along(result, x.limit, s)
     at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - x.s).argmin())
     value = 1.0 / x.value if name == "curvature" and x.value > 0.0 else x.value
-    here = _size(x, x.allowed, value, errors[at])
+    there = _shown(result, x.s)
+    if not there and len(result.times) == 1:
+        return Doubt(f"the error of {_words(name)} at s = {x.s:.5g} m is not estimated", THAT_PLACE)
+    here = _size(x, x.allowed, value, errors[at] if there else 0.0)
     if len(result.times) > 1:
         over_steps = extreme_errors(result).get(x.limit)
         if over_steps is None:
@@ -356,6 +359,15 @@ def _reached(result: StoredResult, name: str, x: Judged) -> Doubt | None:
     k = np.unravel_index(int(np.nanargmax(_size(x, allowed, values, errors))), values.shape)
     place = f"s = {float(s[k[1]]):.5g} m" if not here >= most else f"s = {x.s:.5g} m"
     return Doubt(f"with its error {_words(name)} may pass the limit at {place}", "a smaller accuracy")
+
+
+THAT_PLACE = "`output.points` with that place"
+
+
+def _shown(result: StoredResult, s: float) -> bool:
+    """Whether a place, m, is between output points, whose errors are known."""
+    near = 1e-9 * abs(float(result.s[-1]))
+    return float(result.s[0]) - near <= s <= float(result.s[-1]) + near
 
 
 def _size(x: Judged, allowed: Floats | float, values: Floats | float, errors: Floats | float) -> Floats:
@@ -396,7 +408,8 @@ def _doubt_of_held(result: StoredResult, x: Held) -> Doubt | None:
         return doubt
     if x.by_outputs or x.bound is not None:
         most = "not known" if x.bound is None else f"known to be at most {x.bound:.4g} {x.unit} alone"
-        return Doubt(f"its values between outputs are {most}", "a shorter output.every")
+        remedy = "a shorter output.every" if len(result.times) > 1 else "more output.points, from end to end"
+        return Doubt(f"its values between outputs are {most}", remedy)
     if x.unit == "%":
         bound = _part_with_errors(result, x)
         if bound is None:
@@ -421,7 +434,7 @@ def _part_with_errors(result: StoredResult, x: Held) -> float | None:
     """The part of a capacity or code that nothing exceeds, whatever its errors are, at outputs and over all steps."""
     bound = code_with_errors(result) if x.limit == "code" else bound_with_errors(result)
     if bound is None or len(result.times) == 1:
-        return bound
+        return bound if shows_ends(result) else None
     errors = extreme_errors(result)
     if x.limit == "code":
         steps = code_of_steps(result, errors)
@@ -445,7 +458,12 @@ def _stress_reached(result: StoredResult, x: Held, over_steps: float) -> Doubt |
         error += result.both_sides(f"errors/total/{name}")[1] * _along(result, f"stress_per_{name}", s)
     used = (stress + error) / _along(result, "max_stress", s)
     at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - (x.s or 0.0)).argmin())
-    if max(float(np.nanmax(used)), (x.value + error[at]) / x.allowed, x.value / x.allowed + over_steps) <= 1.0:
+    place = x.s or 0.0
+    there = _shown(result, place)
+    if not there and len(result.times) == 1:
+        return Doubt(f"the error of the stress at s = {place:.5g} m is not estimated", THAT_PLACE)
+    here = x.value + error[at] if there else 0.0
+    if max(float(np.nanmax(used)), here / x.allowed, x.value / x.allowed + over_steps) <= 1.0:
         return None
     return Doubt("with the errors of tension and curvature it may pass the limit", "a smaller accuracy")
 
@@ -466,6 +484,8 @@ def _error_of_held(result: StoredResult, x: Held, clearance: bool) -> float | No
         sizes = [np.linalg.norm(result[y], axis=1) for y in ("reaction_start", "reaction_end") if y in result]
         least = min((float(y.min()) for y in sizes), default=0.0)
         return float(np.degrees(np.arcsin(force / least))) if force < least else None
+    if len(result.times) == 1 and not all(map(shows_ends, [*result.lines.values()] or [result])):
+        return None
     if x.unit == "m" and clearance:  # of two lines the errors of both
         return (2.0 if result.lines else 1.0) * float(figures["error_total_position"])
     return None

@@ -80,7 +80,7 @@ def write_comparison(
 
     results: by the name that each has on the page, or in order, which are called by their files; the first is the one
     that others are compared with.  Differences
-    at an instant are taken where outputs of both have the same time, at the places of the first, on the left of
+    at an instant are taken where outputs of both have the same time, at the places that both have, on the left of
     jumps.  ResultError: one or more than six results, several lines in one, or a page that cannot be written.
     """
     if not isinstance(results, Mapping):
@@ -257,10 +257,11 @@ def _differences(results: Mapping[str, Result]) -> list[Panel]:
             ):
                 continue
             common = base.times[np.isin(np.round(base.times, 9), np.round(other.times, 9))]
-            if not len(common):
+            s = base.s[np.abs(base.s[:, None] - other.s).min(axis=1) <= 1e-9 * length_of(base)]  # between, it bends
+            if not len(common) or not len(s):
                 continue
-            sizes = _sizes(base, other, name, common)
-            over[key], where[key] = (common, sizes.max(axis=1)), (base.s, sizes.max(axis=0))
+            sizes = _sizes(base, other, name, common, s)
+            over[key], where[key] = (common, sizes.max(axis=1)), (s, sizes.max(axis=0))
         if not over:
             continue
         peak = max(float(y.max()) for _, y in over.values())
@@ -277,9 +278,8 @@ def _differences(results: Mapping[str, Result]) -> list[Panel]:
     return panels
 
 
-def _sizes(base: Result, other: Result, name: str, times: np.ndarray) -> np.ndarray:
-    """Sizes (nt, ns) of the difference at common times and the places of the first that the other covers."""
-    s = np.clip(base.s, other.s[0], other.s[-1])
+def _sizes(base: Result, other: Result, name: str, times: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Sizes (nt, ns) of the difference at common times and places s (ns,) m."""
     rows = [np.searchsorted(np.round(r.times, 9), np.round(times, 9)) for r in (base, other)]
     mine, its = (r.at(s=s, names=[name], side="left")[name][k] for r, k in zip((base, other), rows, strict=True))
     gap = mine - its

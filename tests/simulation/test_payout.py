@@ -119,7 +119,7 @@ def test_a_pendulum_of_variable_length() -> None:
     """L th'' + 2 L' th' + g sin th = 0 over ten swings, paid out and taken in: order 2, 1e-3 at 0.02 s."""
     duration = 80.0
     payout = {"lengths": [[0, 10], [20, 16], [40, 20], [60, 14], [80, 10.5]]}
-    law = law_of(Payout(**payout), 10.0, duration)
+    law = law_of(Payout(**payout), 10.0)
 
     def swing(t: float, y: np.ndarray) -> list[float]:
         length, rate, _ = length_at.py_func(law, t)
@@ -485,3 +485,16 @@ def test_an_equilibrium_and_a_plan_need_no_step() -> None:
     assert hybrid.plan(scene).payout is not None
     with hybrid.Simulation(scene) as sim, pytest.raises(ValueError, match=r"time\.step"):
         sim.step()
+
+
+def test_the_length_that_is_paid_out_does_not_hang_on_the_duration():
+    def lengths(duration):
+        rows = [[0, 0], [3, 0.5], [6, 1.0], [10, 1.2]]
+        section = {"length": 100, "mass": 4.0, "diameter": 0.03, "axial_stiffness": 1e7}
+        end = {"kind": "pinned", "position": [80, 0, 0], "payout": {"rates": rows}}
+        ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}
+        more = {"model": "catenary", "mesh": {"cells": 20}, "initial": "equilibrium", "output": {"every": 1.0}}
+        time = {"duration": duration, "step": 0.05}
+        return hybrid.run({"cable": {"sections": [section]}, "ends": ends, "time": time, **more}).payout["length"][:9]
+
+    assert lengths(8.0) == pytest.approx(lengths(12.0), abs=1e-9)

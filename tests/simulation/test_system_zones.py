@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -378,3 +379,31 @@ def test_with_an_accuracy_the_error_that_is_said_holds() -> None:
         off = np.linalg.norm(line.position - rods.lines[name].position, axis=2).max()
         said = line["errors/total/position"].max()
         assert off < 1.5 * said and said < 0.05, (name, off, said)
+
+
+def test_mean_tensions_of_joined_ropes_stay_through_changes_of_zones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with a new solver, but for what Newton's method leaves: a change takes no time."""
+    scene = mooring(time={"duration": 0.5, "step": 0.02}, output={"every": 0.02, "points": 31})
+    rope = ROPE | {"dynamic_stiffness": {"constant": 5e6, "per_tension": 20, "relaxation_time": 2}}
+    for line in scene["lines"].values():
+        line["sections"] = [deepcopy(rope)]
+    found = []
+    for may_change in (CellChanges.may_change, lambda *_: False):
+        monkeypatch.setattr(CellChanges, "may_change", may_change)
+        found.append(hybrid.run(scene).lines["east"])
+    one, other = (x["energy/stretch"] for x in found)
+    assert any(e.kind == "grow" for e in found[0].events)
+    assert np.abs(one - other).max() < 1e-7 * other.max()
+
+
+def test_bodies_feel_lines_whose_cells_follow() -> None:
+    """An output right after a change has the forces of its lines on a body; work goes from the one to the others."""
+    scene = on_a_body()
+    for line in scene["lines"].values():
+        line["model"] = {"kind": "adaptive", "curvature_error": 0.1}
+    found = hybrid.run(scene | {"time": {"duration": 0.7, "step": 0.02}, "output": {"every": 0.02, "points": 31}})
+    force = found["bodies/float/force"]
+    assert np.abs(force - sum(found[f"points/f{k}/force"] for k in range(3))).max() < 1e-9 * np.abs(force).max()
+    work = found["bodies/float/work/lines"]
+    left = work + sum(line["work/end"] for line in found.lines.values())
+    assert np.abs(left).max() < 5e-4 * np.abs(work).max()

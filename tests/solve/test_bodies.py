@@ -368,3 +368,43 @@ def test_a_submerged_body_that_rises_out_of_the_water_is_noted() -> None:
     assert result["bodies/buoy/position"][0, 2] > 0.0
     (event,) = [x for x in result.events if x.kind == "body out of water"]
     assert "buoyancy" in event.text
+
+
+def hull_on_lines(step: float, turned: bool, at: list[float]) -> dict:
+    """Lines are written to the hull, or turned, from it; at: m, where the origin of the scene lies."""
+    hull = {"kind": "free", "initial_guess": [38, -8, -5], "mass": 900.0, "inertia": [350, 400, 380], "volume": 2.6}
+    hull |= {"centre": [0, 0, -0.4], "centre_of_buoyancy": [0, 0, 0.4], "added_mass": [500, 550, 600, 60, 80, 40]}
+    points = {"A": {"position": [0, 0, -40]}, "B": {"position": [75, 12, -40]}, "C": {"position": [35, -50, -38]}}
+    points["A"]["motion"] = {"surge": {"amplitude": 0.3, "period": 5.0}, "ramp": 2.0}
+    places = {"U": [0.5, 0.3, -0.6], "V": [-0.5, 0.3, -0.6], "W": [0, -0.6, -0.5]}
+    points |= {name: {"body": "hull", "place": x} for name, x in places.items()}
+    lines = {}
+    for name, a, b, length in (("a", "A", "U", 55.0), ("b", "B", "V", 54.0), ("c", "C", "W", 58.0)):
+        section = {"mass": 4.0, "diameter": 0.05, "length": length}
+        a, b = (b, a) if turned else (a, b)
+        lines[name] = {"start": a, "end": b, "sections": [section], "mesh": {"cells": 20}, "model": "catenary"}
+    for place in (
+        x
+        for table in (points["A"], points["B"], points["C"], hull)
+        for x in (table.get("position"), table.get("initial_guess"))
+    ):
+        if place:
+            place[:] = [x + y for x, y in zip(place, at, strict=True)]
+    time, output = {"duration": 20 * step, "step": step}, {"every": 5 * step, "points": 9}
+    around = {"fluid": {"density": 1025.0}}
+    return {
+        "environment": around,
+        "points": points,
+        "bodies": {"hull": hull},
+        "lines": lines,
+        "time": time,
+        "output": output,
+    }
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_short_steps_of_a_body_on_lines_in_map_coordinates(turned):
+    here, there = (hybrid.run(hull_on_lines(2e-3, turned, x)) for x in ([0, 0, 0], [5e5, 6e6, 0]))
+    for name in "abc":
+        a, b = (float(x.lines[name].envelope["tension_max"].max()) for x in (here, there))
+        assert b == pytest.approx(a, rel=5e-4)

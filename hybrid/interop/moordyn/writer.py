@@ -83,6 +83,11 @@ class _Shape:
         x, y, z = (float(p + part * (q - p)) for p, q in zip(a, b, strict=True))
         return x, y, z
 
+    def place_of(self, end: str) -> Triple:
+        """Of an end; what is on a winch is where the winch is."""
+        x, y, z = self.places[0 if end == "start" else -1]
+        return x, y, z
+
     def cells(self, a: float, b: float) -> int:
         """Cells between two arc lengths, at least one."""
         near = 1e-6 * (b - a)
@@ -96,7 +101,14 @@ def deck_of(result: Any) -> WrittenDeck:
     """
     scene, _ = read_text(result.scene_text)
     form, lines = scene.form, result.lines or {"": result}
-    writer = _Writer(scene, {name: _shape(lines[called]) for name, called in form.names.items()})
+    shapes = {name: _shape(lines[called]) for name, called in form.names.items()}
+    for name, shape in shapes.items():
+        length = scene.lines[name].cable.length
+        if shape.s[0] > 0.0 or shape.s[-1] < length * (1.0 - 1e-9):
+            expected, fix = "both ends of the line among the points, where a deck holds it", f"add 0 and {length:g}"
+            given = f"points from {shape.s[0]:g} to {shape.s[-1]:g} m"
+            raise SceneError([Complaint(form.text(f"output.points.{name}"), given, expected, fix)])
+    writer = _Writer(scene, shapes)
     for name in scene.bodies:
         place, turned = (result[f"bodies/{name}/{key}"][0].tolist() for key in ("position", "rotation"))
         writer.add_body(name, place, turned)
@@ -251,9 +263,8 @@ class _Writer:
         if not held.swivel:
             self.notes.append(f"{where} holds the twist; MoorDyn has none")
         if point.kind == "fixed":
-            shape = self.shapes[name]
             kind = "Coupled" if point.motion is not None else "Fixed"
-            a = self._moved(shape.place_at(0.0 if end == "start" else shape.s[-1]))
+            a = self._moved(self.shapes[name].place_of(end))
         else:
             kind, a = f"Body{1 + list(self.bodies).index(point.body)}", point.place
         rod = self._rod(kind, a, held.tangent, end)
@@ -403,7 +414,7 @@ class _Writer:
         """What the deck has at a point; "": rods that hold the lines there, which come with them."""
         point = self.scene.points[name]
         line, end = self.scene.lines_at(name)[0]
-        place = self.shapes[line].place_at(0.0 if end == "start" else self.shapes[line].s[-1])
+        place = self.shapes[line].place_of(end)
         if getattr(point, "break_at", None) is not None:
             self.notes.append(f"points.{name}.break_at is left out")
         if point.kind == "guided":

@@ -122,13 +122,6 @@ def times(row, o, x, y):
 
 
 @inner
-def reach_out(place, old, work, p):
-    """Where a fairlead p (body axes) is now, from the origin of its body and in space: rho and r + u + rho."""
-    rho = mat_vec(matrix(place, FRAME), p)
-    return rho, add(add(vector(old, PLACE), vector(work, U)), rho)
-
-
-@inner
 def own_force(body, old, new, work):
     """Force and moment about the origin of all but the lines, and energies and powers that go with them, into `work`."""
     R, w = matrix(new, FRAME), vector(new, W)

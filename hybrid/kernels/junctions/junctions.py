@@ -16,17 +16,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import substitute
-from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, vector
+from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, mat_vec, matrix, vector
 from hybrid.kernels.algebra.sparse_rows import factor_dense, substitute_dense
 from hybrid.kernels.junctions.bodies import (
+    FRAME,
     LINES,
+    PLACE,
+    U,
     X,
     adapt_springs,
     add_own,
     hold_turns,
     move_bodies,
     own_force,
-    reach_out,
     size_of_moves,
 )
 from hybrid.kernels.junctions.borders import (
@@ -113,11 +115,12 @@ def place_ends(l, job, network, given):
         joint, node = joints[l, k], k * job.line.h.shape[0]
         if joint >= points:
             b = joint - points
-            rho, place = reach_out(new[b], old[b], work[b], vector(fairleads[l, k], 0))
+            rho = mat_vec(matrix(new[b], FRAME), vector(fairleads[l, k], 0))
             for i in range(3):
                 arms[l, k, i] = rho[i]
-                if not given:
-                    gaps[l, k, i] = place[i] - job.old.r[node, i] - job.work.u[node, i]
+                if not given:  # by ways, not by places, which far from the origin have few digits
+                    begin = old[b, PLACE + i] - job.old.r[node, i]
+                    gaps[l, k, i] = begin + rho[i] + (work[b, U + i] - job.work.u[node, i])
             if turns(seats, l, k):
                 place_frame(job.ends, k, seats[l, k], new[b])
         if joint >= 0:
@@ -208,6 +211,12 @@ def hand_over(l, job, network, cv):
     for e in range(RIGHT):
         for b in range(3):
             S[e, RIGHT] -= S[e, AT[END] + b] * gaps[l, END, b]
+
+
+@inner
+def lag_of_start(l, job, network, b):
+    """What a start has still to go beyond what its place says to the march, which far from the origin is rounded."""
+    return network.gaps[l, START, b] - (job.ends.position[START, b] - job.old.r[0, b] - job.work.u[0, b])
 
 
 @inner
@@ -335,6 +344,9 @@ def assemble_junctions(network, m):
             continue
         job = read(tables[l])
         hand_over(l, job, network, cv)
+        for b in range(3 if start >= 0 else 0):
+            for e in range(RIGHT):
+                network.S[e, RIGHT] -= network.S[e, AT[START] + b] * lag_of_start(l, job, network, b)
         spread(l, job, network, tensions, row if end != NONE else -1, m)
         if end != NONE:
             row += 1
@@ -409,7 +421,7 @@ def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
 
 
 @inner
-def correct_all(network, gaps, m):
+def correct_all(network, gaps, m, lags):
     """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
     tables, joints, seats, arms = network.tables, network.joints, network.seats, network.arms
     points = network.net.shape[0]
@@ -435,6 +447,8 @@ def correct_all(network, gaps, m):
             row += 1
         if start >= 0:
             place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
+            for b in range(3 if lags else 0):
+                q[b] += lag_of_start(l, job, network, b)
         if not substitute(job.work.X, x, end != NONE, (columns, network.first[l], low, high, q)):
             return l
         if (
@@ -480,7 +494,7 @@ def solve_junctions(network, m):
     if m > 0 and not factor_dense(network.A, m):
         return 0.0
     substitute_dense(network.A, m)
-    return 1.0 if correct_all(network, network.gaps, m) < 0 else NO_NUMBERS
+    return 1.0 if correct_all(network, network.gaps, m, True) < 0 else NO_NUMBERS
 
 
 @inner
@@ -488,7 +502,7 @@ def solve_again(network, m):
     """Corrections to other right-hand sides, by the factors of this iteration; 0: they are not finite."""
     gather_right_sides(network, m)
     substitute_dense(network.A, m)
-    return 1.0 if correct_all(network, network.still, m) < 0 else 0.0
+    return 1.0 if correct_all(network, network.still, m, False) < 0 else 0.0
 
 
 @kernel(inlined=False)

@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.algebra.rotations import dot, mat_vec, matrix, vector
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
-from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, read_members
+from hybrid.kernels.junctions.bodies import BEFORE, FORCE, FRAME, LINES, MOMENT, OWN, POWER, STATE, V, W, read_members
 from hybrid.kernels.junctions.borders import is_grouped_otherwise, is_touched_alone, read_network
+from hybrid.kernels.junctions.junctions import add_pulls
 from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
@@ -522,6 +524,30 @@ def run_network(table):
                 return REGROUP
 
 
+@inner
+def renew_pulls(steps):
+    """Bodies feel lines with the cells of now: their forces, and the power from which the work of these goes on."""
+    network = read_network(steps.odd if steps.counts.parity else steps.even)
+    bodies, work = network.old, network.work
+    if work.shape[0] == 0 or network.rides.shape[0] > 0:  # what presses on shapes of bodies is not known again
+        return
+    network.net[:, :3] = 0.0
+    work[:, LINES : LINES + 6] = 0.0
+    add_pulls(network)
+    for b in range(work.shape[0]):
+        spin = mat_vec(matrix(bodies[b], FRAME), vector(bodies[b], W))
+        work[b, POWER] = dot(vector(work[b], LINES), vector(bodies[b], V)) + dot(vector(work[b], LINES + 3), spin)
+        work[b, BEFORE] = work[b, POWER]
+        for k in range(work.shape[1]):
+            steps.worked[0, b, k] = work[b, k]
+
+
+@kernel
+def pull_anew(table):
+    """The same of a table of `StepsJob`, where Python has changed cells."""
+    renew_pulls(read_steps(table))
+
+
 @kernel
 def run_lines(table):
     """`run_network`, with other cells, and nodes that enter or leave, of lines that ask for nothing else.
@@ -539,4 +565,5 @@ def run_lines(table):
             done = change_lines(steps.nodes_due, steps.reels, steps.reeled, steps.node_asker, steps.reeler)
         if done == 0:
             return STEPPED
+        renew_pulls(steps)
         steps.counts.notices = 0

@@ -36,7 +36,8 @@ window.makeGraphs = (box, onPick) => {
   };
   const text = (v) => (Math.abs(v) >= 1e5 || (v !== 0 && Math.abs(v) < 1e-4) ? v.toExponential(1) : String(v));
   const longest = () => Math.max(...picture.heads.map((head) => head.length), 1e-9);
-  const span = () => window_ || [0, longest()];
+  const first = () => Math.min(0, ...picture.heads.map((head) => head.begin));
+  const span = () => window_ || [first(), longest()];
 
   const draw = () => {
     pending = false;
@@ -189,7 +190,7 @@ window.makeGraphs = (box, onPick) => {
   canvas.addEventListener("pointermove", (e) => { if (drag) drag[1] = e.offsetX; point(e.offsetX, e.offsetY); });
   canvas.addEventListener("pointerdown", (e) => { if (e.pointerType === "mouse" && e.button === 0) { drag = [e.offsetX, e.offsetX]; canvas.setPointerCapture(e.pointerId); } else point(e.offsetX, e.offsetY); });
   canvas.addEventListener("pointerup", () => {
-    if (drag && Math.abs(drag[1] - drag[0]) > 8) { const ends = drag.map(sAt).sort((p, q) => p - q); window_ = [Math.max(ends[0], 0), Math.min(ends[1], longest())]; }
+    if (drag && Math.abs(drag[1] - drag[0]) > 8) { const ends = drag.map(sAt).sort((p, q) => p - q); window_ = [Math.max(ends[0], first()), Math.min(ends[1], longest())]; }
     drag = null;
     again();
   });
