@@ -42,13 +42,14 @@ SAME = 1e-9
 class Excitation:
     """Loads on a line at one frequency, 1/s, complex amplitudes.
 
-    forces: (N+1, 3) N, of the waves but for drag; water: (N+1, 3) m/s, its velocity at the nodes; shifts: (2, 3) m and
-    turns: (2, 3) rad of the ends.
+    forces: (N+1, 3) N, of the waves but for drag; water: (N+1, 3) m/s, its velocity at the nodes; rise: (N+1,) m, of
+    the surface above them; shifts: (2, 3) m and turns: (2, 3) rad of the ends.
     """
 
     omega: float
     forces: Floats
     water: Floats
+    rise: Floats
     shifts: Floats
     turns: Floats
 
@@ -95,6 +96,7 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
     there = SmallSea(sea, count)
     for omega in omegas:
         forces, water = np.zeros((count, 3), complex), np.zeros((count, 3), complex)
+        rise = np.zeros(count, complex)
         shifts, turns = np.zeros((2, 3), complex), np.zeros((2, 3), complex)
         for wave in waves[np.abs(waves[:, 1] - omega) <= SAME * omega]:
             size = wave[0] * np.exp(1j * wave[4])
@@ -103,7 +105,7 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
                     still = _in_sea(there.still(), state, rows_of)
                 in_seas = [still, *(_in_sea(x, state, rows_of) for x in there.waves(wave))]
                 both = size * _amplitudes(in_seas, wave)
-                forces, water = forces + both[:, :3], water + both[:, 3:]
+                forces, water, rise = forces + both[:, :3], water + both[:, 3:6], rise + both[:, 6]
             for k in (0, 1):
                 if moves.follows[k]:
                     place = moves.position[k]
@@ -118,15 +120,15 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
             if moves.fairlead[end, RIDES]:
                 arm = moves.frame[end].reshape(3, 3) @ moves.fairlead[end, 1:4]
                 shifts[end] += np.cross(turn, arm)
-        out.append(Excitation(float(omega), forces, water, shifts, turns))
+        out.append(Excitation(float(omega), forces, water, rise, shifts, turns))
     return out
 
 
 def _in_sea(there: Sea, state: State, rows_of: RowsOf) -> Floats:
-    """Forces (N) but drag on nodes, and velocities of the water (m/s) there, (N+1, 6)."""
+    """Forces (N) but drag on nodes, velocities of the water (m/s) there, and rise of the surface (m), (N+1, 7)."""
     wave_kinematics(there, state.r, np.zeros_like(state.r))
     forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]
-    return np.concatenate([forces, there.flow[:, :3]], axis=1)
+    return np.concatenate([forces, there.flow[:, :3], there.flow[:, 6:]], axis=1)
 
 
 def water_of_wave(sea: Sea, wave: Floats, places: Floats) -> Floats:
@@ -235,6 +237,7 @@ class LoadedLine:
             np.array([getattr(e, of) for e in self.excited], complex).reshape(len(omegas), rows, 3)
             for of, rows in (("forces", count), ("water", count), ("shifts", 2), ("turns", 2))
         )
+        self.rise = np.array([e.rise for e in self.excited], complex).reshape(len(omegas), count)
         self.damping = sparse_rows(moving - still)  # of the sections and of the bed
         self.node, self.d, self.cn, self.ct, self.current = half_cells(self.line, self.sea, state)
         self.axes = axes_across(self.d)

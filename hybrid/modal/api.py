@@ -49,6 +49,7 @@ from hybrid.modal.validity import closing_doubts, doubts_of, left_out, name_of, 
 from hybrid.model.payout import payout_of
 from hybrid.scene.base import Table
 from hybrid.scene.combinations import refuse_use
+from hybrid.scene.ends import Failure
 from hybrid.scene.motion_tables import Harmonic
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
@@ -345,7 +346,32 @@ def of_first_length(asked: Scene) -> list[str]:
     """What is to be known of a line that is paid out."""
     paid = [name for name in asked.asked_lines if payout_of(asked.asked_scene(name))]
     whose = [f"line {name} is" if name else "the line is" for name in paid]
-    return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in whose]
+    found = [f"{who} paid out: all of this is of its first length, to which it does not return" for who in whose]
+    for name, end, failure in _failures(asked):
+        if failure.time is not None:
+            of = f" of line {name}" if len(asked.lines) > 1 else ""
+            found.append(f"the {end}{of} is let go at {failure.time:g} s: all of this is of before")
+    return found
+
+
+def _failures(asked: Scene) -> Iterator[tuple[str, str, Failure]]:
+    """Ends of lines that are let go, by themselves or with the point that holds them: the line, its end, and when."""
+    for name, line in asked.lines.items():
+        for end in ("start", "end"):
+            point = getattr(asked.points[getattr(line, end)], "break_at", None)
+            for given in (line.break_at if asked.breaks(name, end) else None, point):
+                if given is not None:
+                    yield name, end, given
+
+
+def _breaks(asked: Scene, lines: Mapping[str, LineResponse]) -> Iterator[str]:
+    """Ends that are let go by a force which their tension reaches in the time of `most_probable`."""
+    for name, end, failure in _failures(asked):
+        line, k = lines[name], 0 if end == "start" else -1
+        most = line.mean_tension[k] + line.most_probable("tension")[k]
+        if failure.tension is not None and most > failure.tension:
+            of = f" of line {name}" if len(asked.lines) > 1 else ""
+            yield f"not valid: the {end}{of} is let go at {failure.tension:.4g} N, and {most:.4g} N are expected"
 
 
 def _doubts(found: _ModesOnMesh, unstable: int, free: list[str], chosen: np.ndarray) -> Iterator[str]:
@@ -440,6 +466,7 @@ def response(scene: SceneLike, friction: bool = True, check: float | None = None
     notes = [
         *of_first_length(asked),
         *run.notes(lines),
+        *_breaks(asked, lines),
         *([] if rounds < ROUNDS else [f"linear drag has not settled in {ROUNDS} rounds"]),
     ]
     checks = {} if check is None else compared(asked, lines, check)

@@ -16,8 +16,8 @@ from scipy.special import ndtr
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.contact.self_contact_pairs import WINDOW
-from hybrid.kernels.laws.axial_law import DYNAMIC, STRAIN, TENSION
-from hybrid.kernels.laws.bending_law import EACH, PER_TENSION, STIFF, TABLE_MOMENT
+from hybrid.kernels.laws.axial_law import DYNAMIC, FIRST, STRAIN, TENSION
+from hybrid.kernels.laws.bending_law import EACH, FIRST_A, FIRST_B, PER_TENSION, STIFF, TABLE_MOMENT
 from hybrid.kernels.laws.bending_law import TABLE_MOMENT as SLIPS_AT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.laws.seabed import (
@@ -29,7 +29,7 @@ from hybrid.kernels.laws.seabed import (
     planes_under,
     soil_at_rest,
 )
-from hybrid.kernels.state.report import FRICTION, OBSTACLES, SEABED, SOIL
+from hybrid.kernels.state.report import BODIES, FRICTION, OBSTACLES, SEABED, SOIL, SURFACE
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.loaded_line import STRAIGHT, LoadedLine, LoadedMembers, current_at
 from hybrid.linear.matrices import LinearNetwork, pulls
@@ -42,10 +42,14 @@ SLACK_SHARE = 1e-3  # of the time, in which it would be slack
 TURN = 0.2  # rad, standard deviation of the turn of a chord
 STRETCH = 0.25  # of the standard deviation of tension: mean tension by the stretch of swinging
 LIFTS = 0.02  # of the length, that lifts off or touches down
+# Of the change of a body's buoyancy by two standard deviations, and of all of it, how much is not linear.
+NOT_LINEAR, OF_BUOYANCY = 0.25, 0.02
 # Part by which a stiffness changes at a point of a table, beyond which it is no small one.
 KINK = 0.1
 # Step, of the length, by which distances to obstacles are differentiated.
 NEAR = 1e-7
+# Part of a motion by which buoyancy is differentiated.
+SMALL = 1e-4
 # Parts that what is left out may add to a deviation to the first order, where this is no small part of the largest
 # along the line, before a quantity is not valid at all; curvature is not resolved where it is more than ADDED.
 # Part by which the law of drag, known to the first order, may change the deviation of the size of curvature.
@@ -63,7 +67,7 @@ FEW_PLACES = 0.05
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
-    contact = _soil, _touchdown, _on_bed, _on_obstacles
+    contact = _soil, _touchdown, _on_bed, _on_obstacles, _at_surface
     for doubt in (_slack, _swing, _kinks, _layers, *contact, _left_out, _shape, _hardly_known):
         yield from doubt(x, found)
 
@@ -112,13 +116,16 @@ def _kinks(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Where a line whose law is straight between points goes to and fro over one of them, within two deviations."""
     line = x.line
     tables = (
-        ("tension", line.law, line.law_table[:, [TENSION, STRAIN]], found.mean_tension, found.middle, "N"),
-        ("curvature", line.bend_law, line.bend_table[:, : TABLE_MOMENT + 1], found.mean_curvature, found.s, "1/m"),
+        ("tension", line.law, line.law_table[:, [TENSION, STRAIN]], found.mean_tension, found.middle, "N", (FIRST,)),
+        (
+            *("curvature", line.bend_law, line.bend_table[:, : TABLE_MOMENT + 1], found.mean_curvature, found.s, "1/m"),
+            (FIRST_A, FIRST_B),
+        ),
     )
-    for name, law, table, mean, places, unit in tables:
+    for name, law, table, mean, places, unit, columns in tables:
         deviation = found.deviation(name)
-        for i in range(len(law)):
-            first, last = int(law[i, 0]), int(law[i, 1])
+        for i, k in product(range(len(law)), columns):
+            first, last = int(law[i, k]), int(law[i, k + 1])
             if last - first < 3 or (name == "tension" and law[i, DYNAMIC] > 0.0):
                 continue
             at, value = table[first:last].T
@@ -225,6 +232,27 @@ def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     for k, (name, gap, n) in enumerate(zip(x.obstacles, gaps, np.stack(sides, axis=-1), strict=True)):
         way, kind = (found.position - x.carried[k], "body") if k in x.carried else (found.position, "obstacle")
         yield from _crossing(x, gap, np.einsum("fni,ni->fn", way, n), f"{kind} {name}")
+
+
+def _at_surface(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Bodies at nodes that come out of the water, or go under, so far that their buoyancy is not linear."""
+    line = x.linear.line
+    if not (line.bits & SURFACE and line.bits & BODIES):
+        return
+    for i in np.flatnonzero(line.point_buoy > 0.0):
+        rise = np.abs(x.rise[:, i] - found.position[:, i, 2])
+        way = min(2.0 * math.sqrt(0.5 * float((rise**2).sum())), float(rise.sum()))
+        at = (x.sea.surface - found.mean_position[i, 2]) / line.point_height[i] + 0.5
+        wet = np.clip(at + way / line.point_height[i] * np.array([0.0, -1.0, 1.0, -SMALL, SMALL]), 0.0, 1.0)
+        wet = wet if line.point_upright[i] else wet * wet * (3.0 - 2.0 * wet)
+        linear = 0.5 * (wet[4] - wet[3]) / SMALL
+        off = float(np.abs(wet[1:3] - wet[0] - linear * np.array([-1.0, 1.0])).max())
+        if off > max(NOT_LINEAR * linear, OF_BUOYANCY):
+            yield (
+                f"the surface goes up and down by {way:.3g} m at the body at s = "
+                f"{found.s[i]:.4g} m, which is {100.0 * wet[0]:.3g} % wet at rest: its buoyancy changes by up to "
+                f"{100.0 * off:.2g} % of it otherwise"
+            )
 
 
 def _crossing(x: LoadedLine, gap: Floats, way: Floats, what: str) -> Iterator[str]:

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.linear.response_results import shape_of_drag
 from hybrid.modal import validity
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, pinned_at, span
 
 EA, LENGTH, T0 = 1e6, 50.0, 2e4
 COUNT = 13
@@ -168,3 +168,15 @@ def test_curvature_that_is_known_hardly_anywhere_is_not_valid() -> None:
     (note,) = found.notes
     assert "where it varies most, is known; along 98.8 % of the line it is not" in note
     assert not found.valid_for("curvature") and found.valid_for("tension") and found.valid_for("position")
+
+
+def released(**when):
+    moved = pinned_at(80, 0, 0, motion={"heave": {"amplitude": 0.1, "period": 8.0}, "ramp": 8.0}, release_at=when)
+    return span(time=(20.0, 0.1)) | {"ends": {"start": pinned_at(0, 0, 0), "end": moved}}
+
+
+def test_an_end_that_is_let_go_is_told():
+    assert any("let go at 10 s" in x for x in hybrid.response(released(time=10.0)).notes)
+    assert any("let go at 10 s" in x for x in hybrid.modes(released(time=10.0), count=2).notes)
+    assert any("let go at 1000 N" in x for x in hybrid.response(released(tension=1000.0)).notes)
+    assert not any("let go" in x for x in hybrid.response(released(tension=1e5)).notes)
