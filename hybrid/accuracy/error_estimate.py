@@ -63,7 +63,7 @@ from hybrid.store.integrity import Tree, matched
 SAFETY, OF_SIZES = 1.2, 0.2
 # Equilibria whose positions differ by more than these parts are different solutions; and the event that says so.
 OTHER_SOLUTION = 0.75  # of what those of coarser cells differed by
-VISIBLE = 2e-3  # of the largest coordinate
+VISIBLE = 2e-3  # of the length
 SEVERAL = "several equilibria"
 # A quantity that finer runs change by more than this part of what coarser ones did does not converge; unless it is by
 # less than a part of its largest value that nobody asks for.
@@ -103,6 +103,7 @@ class Estimate:
     An error of order p is k^p times as large on cells k times as long.
     """
 
+    length = 0.0  # m, of the line, which positions are parts of; 0: not known, they are of the largest coordinate
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
     between: Mapping[str, Between] = MappingProxyType({})  # of end forces whose outputs do not show all that they do
     _apart: RunSample | None = None  # a finer run that is no better, from which the result is not less far than it is
@@ -388,13 +389,23 @@ class Estimate:
         that holds here or there jumps, and finer cells alone show little of that.
         """
         found = {}
-        for name, (last, before) in self.changes.items():
-            if name not in RIGHT and last > NOT_CONVERGED * before and not self._is_of_edges(name):
-                most = float(np.abs(np.asarray(self.run.values[name])).max(initial=0.0))
-                if last > NOTHING * most:
-                    found[END_FORCES.get(name, name)] = last / before
+        for name in (x for x in self.changes if x not in RIGHT):
+            last, before = self.change(name)
+            if last > NOT_CONVERGED * before and not self._is_of_edges(name) and last > NOTHING * self.size(name):
+                found[END_FORCES.get(name, name)] = last / before
         fall = self.falls.get("tension", np.nan)
         return found | ({"tension": fall} if fall > HARDLY_CONVERGES else {})
+
+    def change(self, name: str) -> tuple[float, float]:
+        """Of an output, on both sides of places where it has two, the last change and that before, root mean square."""
+        sides = [x for x in (name, f"right/{name}") if x in self.changes]
+        count = [float(np.prod(self.run.values[x].shape)) for x in sides]
+        last, before = np.sqrt(np.average(np.square([self.changes[x] for x in sides]), axis=0, weights=count))
+        return float(last), float(before)
+
+    def size(self, name: str) -> float:
+        """The largest value of an output; of positions, which hang on where the origin is, the length of the line."""
+        return self.length if name == "position" and self.length > 0.0 else self.run.largest(name)
 
     def _is_of_edges(self, name: str) -> bool:
         """Whether the largest error of an equilibrium by its cells is known otherwise than by what these change."""
@@ -407,8 +418,7 @@ class Estimate:
     def several_equilibria(self) -> Notes:
         """The event that says so where equilibria of other meshes are other solutions: finer cells change no less."""
         last, before = self.start
-        size = float(np.abs(np.asarray(self.run.values["position"][:1])).max()) if last > 0.0 else 0.0
-        if not (last > OTHER_SOLUTION * before and last > VISIBLE * size):
+        if not (last > OTHER_SOLUTION * before and last > VISIBLE * self.size("position")):
             return ()
         text = (
             f"equilibria of two meshes are {last:.3g} m apart, those of coarser cells {before:.3g} m: they are "

@@ -76,11 +76,12 @@ LostBy = Mapping[str, Lost]  # by quantity
 
 
 def uncertain_by_vibrations(
-    found: LostBy, result: RunSample, errors: Mapping[str, float], allowed: Mapping[str, float] | None
+    found: LostBy, result: RunSample, errors: Mapping[str, float], allowed: Mapping[str, float] | None, length: float
 ) -> list[tuple[str, str]]:
     """The event that says so where steps lose more of free vibrations than error figures show.
 
     found: what they lose; errors: figures, by quantity; allowed: errors that are asked, None: nothing is.
+    length: m, of the line, which positions are parts of.
     """
     worst, of = 1.0, ""
     for name, lost in found.items():
@@ -89,8 +90,8 @@ def uncertain_by_vibrations(
             continue
         if allowed is None:
             sizes = np.asarray(values)
-            sizes = np.linalg.norm(sizes, axis=-1) if name == "position" or name in RAW else sizes
-            least = PART * float(np.abs(sizes).max())
+            sizes = np.linalg.norm(sizes, axis=-1) if name in RAW else sizes
+            least = PART * (length if name == "position" else float(np.abs(sizes).max()))
         else:
             least = allowed[name]
         least = max(least, TIMES_THE_FIGURE * errors[name])

@@ -82,6 +82,7 @@ class LineErrors:
     from_rest: bool = True  # whether it begins from an equilibrium, or is one
     rubs: bool = False  # whether obstacles on which the line may lie have friction
     times: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) s, of the outputs of a result
+    length: float = 0.0  # m, of the line
     held: bool = True  # whether friction may hold the line here or there, so that its tension jumps
     stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far, of all lines
@@ -130,10 +131,9 @@ class LineErrors:
         assert self.estimate is not None
         raw, unit = RAW.get(name, name), {"bending_moment": "N m", "curvature": "1/m", "position": "m"}.get(name, "N")
         least = self.asked.round_off(unit) if self.asked is not None else 0.0
-        values = self.estimate.run.values[raw]
         asked = self.asked.of_tension if self.asked is not None else None
         part = ROUND_OFF_OF if self.held else min(NOTHING, asked or NOTHING)
-        return self.estimate.changes[raw][0] <= max(least, part * float(np.abs(np.asarray(values)).max()))
+        return self.estimate.change(raw)[0] <= max(least, part * self.estimate.size(raw))
 
     def _irregular_note(self) -> list[tuple[str, str]]:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""
@@ -239,12 +239,12 @@ class LineErrors:
             self.own_notes += result.notes
             return False
         estimate = Estimate(result, *self.comparisons, self.from_rest, self.rubs)
+        estimate.length = self.length
         if estimate.share_unknown and (run := faster()) is not None:
             estimate.show_steps(run)
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)
         if not self.irregular:  # else statistics count all steps
             estimate.between = errors_between(self.times, result, self.comparisons[0], self.comparisons[2])
-        self.extremes = ExtremeErrors.of(result, *self.comparisons) if result.extremes and self.moves else None
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
             few = f"{result.cells} cells are so few that there is nothing coarser to compare with; mesh: at least 8"
@@ -262,6 +262,7 @@ class LineErrors:
             )
             fix = "ask for a smaller error" if self.free.steps else "leave time.step out"
             self.own_notes.append(("error uncertain", f"{text}; the error may be larger; {fix}"))
+        self.extremes = ExtremeErrors.of(result, *self.comparisons) if result.extremes and self.moves else None
         self.estimate, self.comparisons = estimate, None
         return True
 
@@ -456,7 +457,7 @@ class LineErrors:
                 found = False
         if saved["estimate"] is not None:
             self.estimate = Estimate.restored(saved["estimate"], scene, shape)
-            self.estimate.run = replace(self.estimate.run, places=places)
+            self.estimate.run, self.estimate.length = replace(self.estimate.run, places=places), self.length
             if saved["extremes"]:
                 self.extremes = ExtremeErrors.restored(saved["extremes"], self.estimate.run)
         if saved["statistics"]:

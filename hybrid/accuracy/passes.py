@@ -222,7 +222,7 @@ def known(
             bounds = None if control.asked is None else sizes_of(control.asked, result)
             from hybrid.accuracy.free_vibrations import uncertain_by_vibrations
 
-            undersampled += uncertain_by_vibrations(lost(), result, largest, bounds)
+            undersampled += uncertain_by_vibrations(lost(), result, largest, bounds, control.length)
     found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
     if control.extremes is not None:
         found[EXTREME_ERRORS] = extreme_figures(control.extremes.run.extremes, control.extremes.errors)
@@ -405,8 +405,8 @@ class Passes:
         times, free = output_times(scene) if case.moves else [], free_in(scene)
         free = free if case.moves else free._replace(steps=False)
         asked, irregular = requested_accuracy(scene), case.moves and is_irregular(scene)
-        how = self._choices.get(name, NAMED), case.from_rest, rubs_on_obstacles(scene), np.array([0.0, *times]), held
-        return LineErrors(asked, free, case.moves, irregular, *how)
+        how = self._choices.get(name, NAMED), case.from_rest, rubs_on_obstacles(scene), np.array([0.0, *times])
+        return LineErrors(asked, free, case.moves, irregular, *how, scene.length, held)
 
     def _surveyed(self, resolution: NetworkResolution) -> NetworkResolution:
         """Models, of lines whose scene names none, and cells by a pre-run, if an accuracy is asked for."""

@@ -414,7 +414,8 @@ class Diagnostics:
     def _doubtful(self, seen: JoinedObservation, values: Mapping[str, Floats]) -> NDArray[np.bool_]:
         """Outputs (nb,) of other cells in each with something beyond a bound by which one would be noted."""
         line, begin, model = seen.line, seen.begin[:-1], self._model
-        found = np.zeros(begin.size, bool)
+        # what obstacles and changes of section hide shows in each output alone
+        found = np.full(begin.size, bool(line.bits & OBSTACLES) or (not self._section and bool(seen.grid.changes)))
         inside = np.zeros(line.s.size, bool)
         inside[1:-1] = (line.spin[:-1] == 0) & (line.spin[1:] == 0)
         inside[seen.end_nodes] = False

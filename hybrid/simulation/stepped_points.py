@@ -120,7 +120,9 @@ class SteppedPoints(SettableObstacles):
         if self.scene.dimension == 2:
             self._check_plane(name, "position", np.array(there) - where.at_time(self.t)[0])
         if frame is not None:
-            turn = triple(rotation_vector(where.at_time(self.t)[2].T @ rotation_asked(frame, "frame")), "frame")
+            now = where.at_time(self.t)[2]
+            turn = triple(rotation_vector(now.T @ rotation_asked(frame, "frame")), "frame")
+            self._check_plane(name, "turn of the frame", now @ turn, turns=True)
         self._next[name] = there, speed, turn
 
     def set_end(
@@ -214,12 +216,14 @@ class SteppedPoints(SettableObstacles):
         if self._is_moved(name):
             raise ValueError(f"{said} has a motion in the scene: leave that out to set it from outside")
 
-    def _check_plane(self, name: str, what: str, vector: Floats) -> None:
+    def _check_plane(self, name: str, what: str, vector: Floats, turns: bool = False) -> None:
+        """ValueError where a vector leaves the plane of `dimension: 2`; turns: or, an axial one, turns out of it."""
         normal = self._run.model.models[0].kept_in
         if normal is not None:
             across = float(vector @ normal)
+            across = float(np.linalg.norm(vector - across * normal)) if turns else across
             if abs(across) > IN_PLANE * float(np.abs(vector).max(initial=1.0)):
-                out = "out of the plane that dimension: 2 keeps the cable in"
+                out = f"{'about an axis in' if turns else 'out of'} the plane that dimension: 2 keeps the cable in"
                 raise ValueError(
                     f"{what} of {self._key_of(name)}: {across:.3g} {out}; leave dimension out of the scene"
                 )
@@ -244,6 +248,7 @@ class SteppedPoints(SettableObstacles):
             raise ValueError(f"moment: the line is a catenary at {said}, which takes no moment")
         wanted, turning = vector(force, "force"), vector(STILL if moment is None else moment, "moment")
         self._check_plane(name, "force", wanted)
+        self._check_plane(name, "moment", turning, turns=True)
         ((conditions, k),) = self._conditions_at(name)
         conditions.load("force", k, wanted, self.t)
         if moment is not None:

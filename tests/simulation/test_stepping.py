@@ -525,3 +525,24 @@ def test_nor_for_what_its_zones_want(most):
         while cable.t < 1.5:
             cable.step()
         assert "grow" in {e.kind for e in cable.result().events} or "split" in {e.kind for e in cable.result().events}
+
+
+def test_what_turns_a_cable_out_of_its_plane_is_refused_from_outside():
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    scene = cable_scene(
+        {"length": 100, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 200.0},
+        start,
+        {"kind": "free"},
+        model="rod",
+        mesh=20,
+        time=(1.0, 0.1),
+        dimension=2,
+    )
+    simulation = hybrid.Simulation(scene)
+    simulation.set_force("end", [50, 0, 0], [0, 20, 0])
+    with pytest.raises(ValueError, match=r"moment of ends\.end"):
+        simulation.set_force("end", [50, 0, 0], [0, 0, 20])
+    frame = simulation.frames()[0]
+    yawed = np.array([[np.cos(0.1), -np.sin(0.1), 0.0], [np.sin(0.1), np.cos(0.1), 0.0], [0.0, 0.0, 1.0]]) @ frame
+    with pytest.raises(ValueError, match="turn of the frame"):
+        simulation.set_point("start", [0, 0, 0], frame=yawed)

@@ -396,3 +396,25 @@ def test_a_sprung_clamp_is_resolved_in_a_plane_as_in_space():
     }  # fmt: skip
     said = [{e.kind for e in hybrid.run(scene | {"dimension": dimension}).events} for dimension in (2, 3)]
     assert said[0] == said[1]
+
+
+PLAIN = {"length": 100, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 200.0}
+
+
+def paid_out(rate: float, sections: Any, x: float, **tables: Any) -> set[str]:
+    end = pinned_at(x, 0, 0, payout={"rate": rate, "ramp": 1.0})
+    scene = cable_scene(
+        sections, pinned_at(0, 0, 0), end, model="rod", mesh=40, time=(6.0, 0.05), output=(0.25, 11), **tables
+    )
+    return {event.kind for event in hybrid.run(scene).events}
+
+
+def test_a_line_that_is_paid_out_through_a_bar_says_so():
+    bar = {"kind": "cylinder", "at": [42, 0, -27.5], "axis": [0, 1, 0], "radius": 0.05, "stiffness": 1e4}
+    kinds = paid_out(0.5, PLAIN, 80.0, obstacles={"bar": bar})
+    assert {"deep in an obstacle", "unresolved contact", "unresolved bend"} <= kinds
+
+
+def test_a_change_of_section_of_a_line_at_a_winch_is_told():
+    halves = [PLAIN | {"length": 50, "bending_stiffness": x} for x in (2e4, 20.0)]
+    assert "unresolved change of section" in paid_out(-0.2, halves, 96.0)
