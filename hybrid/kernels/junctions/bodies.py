@@ -339,9 +339,10 @@ def end_bodies(old, new, work, s):
             y[PLACE + k] = x[PLACE + k] + z[U + k]
             y[A + k] = (z[U + k] - dt * x[V + k] - dt * dt * (0.5 - be) * x[A + k]) / (be * dt * dt)
             y[WA + k] = (z[N + k] - dt * x[W + k] - dt * dt * (0.5 - be) * x[WA + k]) / (be * dt * dt)
-        put_matrix(y, FRAME, orthonormal(matrix(y, FRAME)))
         n = vector(z, N)
         size = math.sqrt(dot(n, n))
+        if size > 0.0:  # else to and fro by round-off
+            put_matrix(y, FRAME, orthonormal(matrix(y, FRAME)))
         if not size <= turn:
             turn = size
     return turn
