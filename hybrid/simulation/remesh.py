@@ -35,7 +35,7 @@ from hybrid.kernels.state.state import (
     memory_of,
     no_sea,
 )
-from hybrid.kernels.step.line_step import RUN, Task, blank_job
+from hybrid.kernels.step.line_step import ASSEMBLY, Task, blank_job
 from hybrid.model.build import Model
 from hybrid.model.line import OF_ALL, lines_like, of_all
 from hybrid.model.network import NetworkModel
@@ -414,7 +414,10 @@ class Remesh:
         self._table.bind(even=self._pairs[0][0].numbers, odd=self._pairs[0][1].numbers, waiting=self._waiting)
         self._table.bind(run=self._alone.numbers, run_places=in_run, beside=beside.numbers, beside_places=in_beside)
         self._table.bind(**numbers)
-        at.task, at.per_node, at.number = self._alone.part("task").start, self.per_node, self._number
+        forces, where = Table(blank_job), self._alone.part("task")
+        forces.bind(task=Task(ASSEMBLY, ca=HEAVY, limits=self._limits))
+        self._table.bind(task=forces.numbers[where].copy())
+        at.task, at.per_node, at.number = where.start, self.per_node, self._number
         for name, kernel in (("due", due), ("plan", plan), ("keep", keep)):
             setattr(self._calls, name, kernel.address(planners[0].numbers))
         for name, kernel in (("before_forces", before_forces), ("after_forces", after_forces), ("books", begin_line)):
@@ -444,7 +447,6 @@ class Remesh:
             copy_fields(itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
         copy_fields(books, self._books(0, n), REST_OF_BOOKS)
         self._copy_beside(n)
-        self._alone.bind(task=Task(RUN, ca=HEAVY, limits=self._limits))
         self._calls.solver = self._solver.marcher_of(self._number)
         f.put_cells(self._table.numbers)
         self._synced = -1

@@ -147,6 +147,9 @@ class Run(RecordedRun):
         try:
             if self._begins:
                 self.begin_motion()
+            else:
+                self.stops()
+                self._let_jump(self.t, self.resolution.one.step)  # loads that a run up to here has left as they were
 
             for t in sorted({t for part in self.parts for t in part.phases}):
                 for stop in self.stops(t):
@@ -387,14 +390,18 @@ class Run(RecordedRun):
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): an output, which is of the moment before, and other loads."""
         self.output_due()
-        if falls_on(stop, self._jumps, step):
+        self._let_jump(stop, step)
+        if self.network.output.exact or self.resolution.one.ends or falls_on(stop, self._breaks, step):
+            self.leg = (stop, 0)
+
+    def _let_jump(self, stop: float, step: float) -> None:
+        """Other loads from a stop (s) on, where they jump and have not."""
+        if falls_on(stop, self._jumps, step) and self.loaded < self.t:
             self.ends_of_now()
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self.restart_steps()
-        if self.network.output.exact or self.resolution.one.ends or falls_on(stop, self._breaks, step):
-            self.leg = (stop, 0)
 
     def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""

@@ -452,8 +452,7 @@ class LineJobs:
         if self._part is not None:
             pairs.append(self._joined_tables[number])
         even = self._tables[number][0]
-        self._beside[number] = (beside := even.again(np.empty_like(even.numbers)),)
-        beside.hold(task=None)  # steps have written their lengths there: a task is put there as a whole
+        self._beside[number] = (even.again(np.empty_like(even.numbers)),)
         return self._beside[number][0], pairs
 
     def room_beside(self, number: int, twice: bool) -> Callable[[int], Work]:

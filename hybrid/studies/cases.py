@@ -357,24 +357,29 @@ def _parts(path: str) -> list[str | int]:
     return [int(x[1:]) if x[0] == "[" else x.strip() for x in re.findall(r"\[\d+|[^.\[\]]+", path)]
 
 
+def _key(data: Any, part: str | int) -> str | int:
+    """What a part of a path is called in a table, which has keys of today."""
+    if isinstance(data, dict) and part not in data:
+        return next((now for now, former in FORMER_NAMES.items() if part in former and now in data), part)
+    return part
+
+
 def _table_at(data: Any, path: str) -> Any:
     """The table at a path; {} where there is none."""
     for part in _parts(path):
-        data = data[part] if isinstance(part, int) else data.get(part, {})
+        data = data[part] if isinstance(part, int) else data.get(_key(data, part), {})
     return data
 
 
 def _set(data: Any, path: str, value: Any) -> None:
     """Set a value in tables and lists; tables that are not there are made."""
     parts = _parts(path)
-    for part, after in pairwise(parts):
+    for former, after in pairwise(parts):
+        part = _key(data, former)
         if isinstance(data, dict) and not isinstance(data.get(part), dict | list):
             data[part] = {} if isinstance(after, str) else []
         data = data[part]
-    last = parts[-1]
-    if isinstance(data, dict) and last not in data:  # under its former name
-        last = next((now for now, former in FORMER_NAMES.items() if last in former and now in data), last)
-    data[last] = value
+    data[_key(data, parts[-1])] = value
 
 
 # Tables in CSV files: a header and rows, with their lines in the file.

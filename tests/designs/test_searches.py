@@ -111,6 +111,7 @@ def test_what_has_to_be_0_may_be_0_at_first():
     assert found.numbers["a"] == pytest.approx(45.98771, rel=1e-6)
 
 
+@pytest.mark.needs("simpleeval")
 @pytest.mark.parametrize("X", [0.0, 5e5])
 def test_designs_do_not_hang_on_where_the_scene_lies(X, tmp_path):
     move = {"start": {"motion": {"surge": {"amplitude": 0.5, "period": 4}, "ramp": 8}}}

@@ -47,6 +47,7 @@ def test_anchors_of_a_deck_stand_where_they_are_with_a_winch_at_the_start(tmp_pa
     assert "\n1 Fixed 0 0 -47 0 0 0 0\n" in text
 
 
+@pytest.mark.needs("rainflow")
 def test_cycles_of_an_end_force_are_not_those_of_another_place(tmp_path):
     made = hybrid.export(hybrid.run(mooring([20, 40, 70])), tmp_path / "a.csv", format="fatigue")
     rows = [x for x in csv.reader(made.files[0].read_text().splitlines()) if not x[0].startswith("#")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -397,3 +398,39 @@ def test_a_winch_goes_on_with_the_pull_behind_a_jump_of_load(step):
     late = np.maximum(result.t - 3.0, 0.0)
     assert np.abs(result["payout/rate"] + 200.0 / 180.0 * late).max() < 1e-4
     assert np.abs(result["payout/length"] - 40.0 + 100.0 / 180.0 * late**2).max() < 5e-4
+
+
+def test_a_run_that_is_resumed_where_a_load_jumps_is_the_same(tmp_path):
+    winch = {"tension": 80.0 * 9.81, "inertia": 100.0, "ramp": 1.0}
+    scene = {
+        "cable": {"sections": [{"length": 40.0, "mass": 1e-6}]},
+        "ends": {
+            "start": {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -600.0], "until": 3.0}},
+            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 120.0, "winch": winch}},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
+        "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 0.5},
+    }  # fmt: skip
+    part = deepcopy(scene)
+    part["time"]["duration"] = 3.0
+    hybrid.run(part, output=tmp_path / "part.h5")
+    one, other = hybrid.run(scene), hybrid.resume(tmp_path / "part.h5", until=4.0)
+    assert np.abs(one["payout/rate"] - other["payout/rate"]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "payout",
+    [{"longest": 120.0, "winch": {"tension": 2746.8, "inertia": 100.0, "ramp": 1.0}}, {"rate": 2.0, "ramp": 1.0}],
+)
+def test_a_node_that_enters_behind_a_jump_of_load_leaves_the_pull_at_the_winch(payout):
+    scene = {
+        "cable": {"sections": [{"length": 40.0, "mass": 5.0}]},
+        "ends": {
+            "start": {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -600.0], "until": 2.0}},
+            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
+        "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 0.1},
+    }  # fmt: skip
+    found = hybrid.run(scene)
+    assert np.linalg.norm(found["reaction_end"], axis=1).min() > 2000.0

@@ -11,6 +11,8 @@ import pytest
 import hybrid
 from tests.scenes import pinned_at, span
 
+pytestmark = pytest.mark.needs("dask", "zarr", "xarray", "simpleeval", "SALib")
+
 
 def study(folder, scene, output="a.zarr", **more):
     (folder / "p.yaml").write_text(json.dumps(scene))
@@ -128,3 +130,13 @@ def test_shares_of_a_design_that_a_condition_has_cut(tmp_path):
     assert hybrid.shares(tmp_path / "a.zarr", "T").rows[0].variable == "m"
     with pytest.raises(hybrid.ResultError, match="only_if"):
         hybrid.sensitivity(tmp_path / "a.zarr", "T")
+
+
+@pytest.mark.parametrize("key", ["near", "initial_guess"])
+def test_a_coordinate_may_vary_under_the_former_name_of_its_place(tmp_path, key):
+    scene = span()
+    scene["ends"]["end"] = {"kind": "body", "mass": 50.0, "volume": 0.0, "initial_guess": [10, 0, -90]}
+    (tmp_path / "p.yaml").write_text(json.dumps(scene))
+    more = {"vary": {f"ends.end.{key}[0]": [10, 12]}, "collect": {"T": {"quantity": "tension"}}, "static": True}
+    found = hybrid.study(tmp_path / "p.yaml", tmp_path / "a.zarr", workers=1, **more)
+    assert found.status.values.tolist() == [1, 1]

@@ -52,7 +52,6 @@ from hybrid.kernels.state.state import (
     blank_line,
     blanks,
 )
-from hybrid.kernels.step.line_step import ASSEMBLY, RUN
 
 Numbers = NDArray[np.int64]
 
@@ -113,6 +112,7 @@ class RemeshJob(NamedTuple):
     change: Numbers  # tables of the parts, one behind the other
     changed: NumberBlocks  # (2 old sides x 2 parities, 3, size)
     run: Numbers  # table of the run
+    task: Numbers  # its task where forces of a line as it is are asked for
     run_places: Numbers  # of those of its numbers that follow the cells
     in_run: NumberBlocks  # (2 sides, 3, run_places.size)
     even: Numbers  # likewise its tables in steps from states of even parity, and of odd
@@ -187,6 +187,14 @@ def put_cells(table):
         put_at(job.in_odd[k], job.run_places, m, job.odd_joined)
 
 
+@inner
+def exchange_tasks(job):
+    """The table of the run gets the other task: that of steps has lengths and schemes of its own."""
+    for k in range(job.task.shape[0]):
+        i = job.at.task + k
+        job.run[i], job.task[k] = job.task[k], job.run[i]
+
+
 @kernel
 def end_cells(table):
     """Lengths, books and forces of the new cells, which the run goes on with; the energy is booked."""
@@ -197,9 +205,9 @@ def end_cells(table):
     put_cells(table)
     job.own.now = job.clock.now
     call(calls.before_forces, job.run)
-    job.run[at.task] = ASSEMBLY
+    exchange_tasks(job)
     call_solver(calls.solver, job.run)
-    job.run[at.task] = RUN
+    exchange_tasks(job)
     if calls.stand != 0:
         call(calls.stand, job.beside)
     call(calls.after_forces, job.run)
