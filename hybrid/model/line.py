@@ -43,8 +43,8 @@ from hybrid.scene.section_laws import Curve, Layer, slopes
 # What inertia the sections of rods have.
 NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
 
-# Of a line, what is not of its nodes and cells.
-OF_ALL = ("bits", "plane", "torsion", "law_table", "bend_table", "moved")
+# Fields of a line that are not of its nodes or cells.
+OF_WHOLE_LINE = ("bits", "plane", "torsion", "law_table", "bend_table", "moved")
 
 
 @cache
@@ -55,7 +55,7 @@ def lines_with(*names: str) -> Packed:
         more: dict[str, Any] = {name: blank(FIELDS[name]._replace(optional=False), n) for name in names}
         return blank_line(n)._replace(**more)
 
-    return Packed(one, given=OF_ALL)
+    return Packed(one, given=OF_WHOLE_LINE)
 
 
 def lines_like(line: Line) -> Packed:
@@ -63,9 +63,9 @@ def lines_like(line: Line) -> Packed:
     return lines_with(*(name for name, field in FIELDS.items() if field.optional and getattr(line, name).size))
 
 
-def of_all(line: Line) -> dict[str, Any]:
-    """What `lines_like` is given."""
-    return {name: getattr(line, name) for name in OF_ALL}
+def of_whole_line(line: Line) -> dict[str, Any]:
+    """Fields that belong to a line as a whole, by name, which `lines_like` is given."""
+    return {name: getattr(line, name) for name in OF_WHOLE_LINE}
 
 
 def line_on(

@@ -186,8 +186,11 @@ class Part:
         """While accelerations are found: second rates (N,) m/s2 of the lengths of cells, by line."""
         raise NotImplementedError
 
-    def find_rotors(self, find: Callable[[], None]) -> None:
-        """Accelerations that are about to be found jump: those of rotors, by `find` with some of them.  LineFailed."""
+    def accelerate_rotors(self, solve: Callable[[], None]) -> None:
+        """Accelerations jump: give rotors theirs, before those of lines are solved for.
+
+        solve: solves for accelerations and forces of lines, with rotors as they are; LineFailed where it cannot.
+        """
 
     @property
     def breaks(self) -> list[float]:
@@ -279,6 +282,7 @@ class Parts:
         self.attach, self.sync, self.use_solver = (_having(parts, x) for x in ("attach", "sync", "use_solver"))
         self.prepare, self.begin_leg = _having(parts, "prepare"), _having(parts, "begin_leg")
         self.forces_on, self.log = _having(parts, "forces_on"), _having(parts, "log")
+        self.accelerate_rotors = _having(parts, "accelerate_rotors")
         self.at_output, self.at_stop = _having(parts, "at_output"), _having(parts, "at_stop")
         self.note_step, self.after_step = (
             [(x.wants, verb) for x in parts for verb in _having([x], name)] for name in ("note_step", "after_step")

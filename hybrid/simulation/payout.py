@@ -175,8 +175,8 @@ class PayingOut:
         """Whether a winch holds a tension."""
         return bool(self.winch.tension)
 
-    def taken(self, t: float) -> float:
-        """What inertia, losses and tension of a winch take at t (s), N."""
+    def resistance(self, t: float) -> float:
+        """Pull (N) that inertia, losses and tension of a winch balance at t (s)."""
         winch = self.winch
         lost, _ = losses.py_func(winch, winch.rate_now)
         return float(winch.inertia * winch.true_now + lost + tension_held.py_func(winch, t))

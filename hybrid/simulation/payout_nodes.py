@@ -32,7 +32,7 @@ from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.state.report import REMEMBERS
 from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
-from hybrid.model.line import lines_like, of_all
+from hybrid.model.line import lines_like, of_whole_line
 from hybrid.outputs.observation import Output
 from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
 from hybrid.simulation.result_file import marks_on
@@ -140,7 +140,7 @@ class NodeChanges(Remesh):
     def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
         """With what its cells lacked, which is kept."""
         k, paying, model, end = self.side, self._paying, self.model, begin + OF_REEL * cells
-        line = lines_like(model.line)(cells, **of_all(model.line))
+        line = lines_like(model.line)(cells, **of_whole_line(model.line))
         reel = self._reel(1 - k, cells)
         reel.numbers[:] = paying.reel.numbers
         self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)

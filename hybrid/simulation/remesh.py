@@ -37,7 +37,7 @@ from hybrid.kernels.state.state import (
 )
 from hybrid.kernels.step.line_step import ASSEMBLY, Task, blank_job
 from hybrid.model.build import Model
-from hybrid.model.line import OF_ALL, lines_like, of_all
+from hybrid.model.line import OF_WHOLE_LINE, lines_like, of_whole_line
 from hybrid.model.network import NetworkModel
 from hybrid.outputs.observation import Output
 from hybrid.simulation.lines_contact import LinesWatch
@@ -336,7 +336,7 @@ class Remesh:
 
     def line(self, k: int, cells: int) -> Line:
         """The line of side k."""
-        return self._lines[k].view(cells, **of_all(self.model.line))
+        return self._lines[k].view(cells, **of_whole_line(self.model.line))
 
     def state(self, k: int, which: int, cells: int) -> State:
         """The state of side k of even (which = 0) or odd parity (1)."""
@@ -438,7 +438,7 @@ class Remesh:
             copy_fields(turn.lines[self._number], self.state(0, which, n), ("turn",))
             if pushes[which].size:
                 self._push(0, which, n)[:] = pushes[which]
-        copy_fields(model.line, self.line(0, n), OF_ALL)
+        copy_fields(model.line, self.line(0, n), OF_WHOLE_LINE)
         copy_fields(model.sea.values, self._sea_on(n), REST_OF_SEA)
         copy_fields(work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         self._base[:] = books.base

@@ -256,7 +256,7 @@ class RunOfLines:
         self.place_ends(self.t)
         self.model.update_water(self.t, self.state.bodies, 0.0, solver.bodies)
 
-        def find() -> None:
+        def solve() -> None:
             lengthening: dict[int, Floats] = {}
             with ExitStack() as stack:
                 for forces_on in self.parts.forces_on:
@@ -265,9 +265,9 @@ class RunOfLines:
             if taken.outcome != Outcome.OK:
                 raise self._explained(taken, 0.0)
 
-        for part in self.parts:
-            part.find_rotors(find)
-        find()
+        for accelerate in self.parts.accelerate_rotors:
+            accelerate(solve)
+        solve()
 
     # --- other lines in mid-motion --------------------------------------------------------------------
 

@@ -248,30 +248,32 @@ class RunPayout(Part):
                 stack.enter_context(x.forces_on())
             yield {k: x.lengthening for k, x in self.lines.items()}
 
-    def find_rotors(self, find: Callable[[], None]) -> None:
-        """Winches that hold a tension accelerate by the pull that the lines have now, which is linear in that."""
+    def accelerate_rotors(self, solve: Callable[[], None]) -> None:
+        """Winches that hold a tension: what is left of the balance of each is linear in the accelerations of all."""
         run = self._run
         free = {k: x for k, x in self.lines.items() if x.holds_tension and run.t > x.winch.begin}
         if not free:
             return
 
-        def left() -> Floats:  # N, that acts on the rotors
-            find()
+        def out_of_balance() -> Floats:  # N
+            solve()
             at = {k: FORCE_B if x.plan.side else FORCE_A for k, x in free.items()}
             pulls = {k: np.linalg.norm(run.solver.work[k].report[i : i + 3]) for k, i in at.items()}
-            return np.array([pulls[k] - x.taken(run.t) for k, x in free.items()])
+            return np.array([pulls[k] - x.resistance(run.t) for k, x in free.items()])
 
         for line in run.lines:
             line.books.counts.repeats = 1  # no extremes of what is tried
-        first, answers = left(), []
-        for x in free.values():
-            x.accelerate(1.0)
-            answers.append(left() - first)
-            x.accelerate(-1.0)
+        try:
+            first, answers = out_of_balance(), []
+            for x in free.values():
+                x.accelerate(1.0)
+                answers.append(out_of_balance() - first)
+                x.accelerate(-1.0)
+        finally:
+            for line in run.lines:
+                line.books.counts.repeats = 0
         for x, more in zip(free.values(), np.linalg.solve(np.array(answers).T, -first), strict=True):
             x.accelerate(float(more))
-        for line in run.lines:
-            line.books.counts.repeats = 0
 
     def after_step(self) -> None:
         """Nodes enter and leave.  LineFailed: a winch has come to its end."""

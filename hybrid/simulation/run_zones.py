@@ -327,7 +327,7 @@ class RunZones(Part):
             x.pending = None
         self._change(changes)
         if changes and all(x.cells is not None for x, _ in changes):
-            self._run.loop.pull_anew()
+            self._run.loop.renew_pulls()
 
     def _change(self, changes: Sequence[tuple[_LineZones, Change]]) -> None:
         """Carry out changes of lines, in their arrays where that can be."""

@@ -22,8 +22,8 @@ from hybrid.kernels.run.network_run import (
     LINE,
     REGROUP,
     blank_steps_job,
-    pull_anew,
     renew_ended,
+    renew_pulls,
     run_lines,
     run_network,
     sample_network,
@@ -272,9 +272,9 @@ class NetworkSteps:
         cost = max(self._cells, 1) * (1.0 + self._waves / WAVES_OF_A_CELL)
         self.counts.quota = max(1, min(ROWS, most, int(CELL_STEPS / cost)))
 
-    def pull_anew(self) -> None:
-        """Bodies feel lines whose cells have changed in place."""
-        pull_anew(self._job.numbers)
+    def renew_pulls(self) -> None:
+        """Bodies feel lines whose cells Python has changed in place."""
+        renew_pulls(self._job.numbers)
 
     def go(self) -> int:
         """Go on until a code of kernels.state.books."""

@@ -453,7 +453,7 @@ def _dataset(contents: Contents, name: str) -> Any:
 def _interpolate(
     array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str, turns: bool = False
 ) -> Any:
-    """turns: angles from -pi to pi, between which it is the short way."""
+    """Values between those of a grid, on straight lines; turns: angles from -pi to pi, the short way round."""
     x = np.asarray(where, dtype=float)
     if len(grid) == 0:
         raise ResultError(f"the result holds no output yet, so nothing at {dim} = {where} {unit}")

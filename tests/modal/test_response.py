@@ -610,3 +610,19 @@ def test_a_buoy_that_comes_out_of_the_water_is_told():
     # in waves of 1.4 m the tension has a standard deviation of 760 N in time, not 272 N
     assert any("buoyancy" in x for x in hybrid.response(below_the_surface(1.4)).notes)
     assert not any("buoyancy" in x for x in hybrid.response(below_the_surface(0.3)).notes)
+
+
+def test_the_length_that_lifts_off_does_not_go_by_the_direction_of_the_line():
+    """It lies on the bed with cells of 2 m and 1.1 m."""
+    section = {"length": 75.0, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 2e6, "bending_stiffness": 10.0}
+    zones = [{"rod": 20.0, "cells": 10}, {"rod": 55.0, "cells": 50}]
+    high = pinned_at(50, 8, 2, motion={"heave": {"amplitude": 0.5, "period": 7.0}, "ramp": 20.0})
+    notes = []
+    for way in (1, -1):
+        scene = cable_scene(
+            section | {"drag": {"normal": 1.2}}, *(pinned_at(0, 0, -39), high)[::way], fluid={"density": 1025},
+            seabed={"z": -40.0, "stiffness": 5e3, "damping": 100.0}, model={"kind": "zones", "zones": zones[::way]},
+            time=(40.0, 0.1),
+        )  # fmt: skip
+        notes.append([x for x in hybrid.response(scene).notes if "lift off" in x])
+    assert notes[0] == notes[1] and len(notes[0]) == 1

@@ -650,45 +650,32 @@ def test_parts_of_a_force_that_is_nothing_are_not_asked(more):
 PLAIN = {"length": 100, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 200.0}
 
 
-def test_a_contact_force_without_an_error_figure_is_not_within():
+def on_a_bed(z, model, mesh, x=0.0):
+    """A line whose end heaves, with a limit of contact force; x: m, where it begins."""
     section = PLAIN | {"bending_stiffness": 20.0, "max_contact_force": 500.0}
-    end = pinned_at(80, 0, 0, motion={"heave": {"amplitude": 2.0, "period": 6.0}, "ramp": 6.0})
+    end = pinned_at(x + 80, 0, 0, motion={"heave": {"amplitude": 2.0, "period": 6.0}, "ramp": 6.0})
     scene = cable_scene(
-        section,
-        pinned_at(0, 0, 0),
-        end,
-        model={"kind": "adaptive", "curvature_error": 0.1, "rod_cell": 2.5},
-        mesh=40,
-        time=(6.0, 0.05),
-        output={"every": 0.5, "points": 11, "errors": True},
-        seabed={"z": -20.0, "stiffness": 2000.0},
-    )
-    found = hybrid.run(scene)
+        section, pinned_at(x, 0, 0), end, model=model, mesh=mesh, time=(6.0, 0.05),
+        output={"every": 0.5, "points": 11, "errors": True}, seabed={"z": z, "stiffness": 2000.0},
+    )  # fmt: skip
+    return hybrid.run(scene)
+
+
+def test_a_contact_force_without_an_error_figure_is_not_within():
+    found = on_a_bed(-20.0, {"kind": "adaptive", "curvature_error": 0.1, "rod_cell": 2.5}, 40)
     assert "no error figure" in {event.kind for event in found.events}
     assert found.utilisation()["max_contact_force"].verdict == "not verified"
 
 
-def test_several_equilibria_are_told_wherever_the_origin_is():
-    section = PLAIN | {"bending_stiffness": 20.0, "max_contact_force": 500.0}
-    for x in (0.0, 1e5):
-        end = pinned_at(x + 80, 0, 0, motion={"heave": {"amplitude": 2.0, "period": 6.0}, "ramp": 6.0})
-        scene = cable_scene(
-            section,
-            pinned_at(x, 0, 0),
-            end,
-            model="catenary",
-            mesh=3,
-            time=(6.0, 0.05),
-            output={"every": 0.5, "points": 11, "errors": True},
-            seabed={"z": -30.0, "stiffness": 2000.0},
-        )
-        found = hybrid.run(scene)
-        assert "several equilibria" in {event.kind for event in found.events}
-        assert "position" in found.attributes["errors_not_converged"].split(",")
-        assert found.utilisation()["max_contact_force"].verdict == "not verified"
+@pytest.mark.parametrize("x", [0.0, 1e5])
+def test_several_equilibria_are_noted_wherever_the_origin_is(x):
+    found = on_a_bed(-30.0, "catenary", 3, x)
+    assert "several equilibria" in {event.kind for event in found.events}
+    assert "position" in found.attributes["errors_not_converged"].split(",")
+    assert found.utilisation()["max_contact_force"].verdict == "not verified"
 
 
-def test_what_does_not_converge_behind_a_change_of_section_is_told_as_before_it():
+def test_what_does_not_converge_behind_a_change_of_section_is_noted_as_before_it():
     halves = [PLAIN | {"length": 50, "bending_stiffness": x} for x in (2e4, 20.0)]
     motion = {"heave": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0}
     ends = [pinned_at(0, 0, 0), pinned_at(80, 0, 0, motion=motion)]
@@ -697,4 +684,4 @@ def test_what_does_not_converge_behind_a_change_of_section_is_told_as_before_it(
         output = {"every": 0.5, "points": 11, "errors": True}
         scene = cable_scene(halves[::way], *ends[::way], model="rod", mesh=20, time=(8.0, 0.1), output=output)
         found.append(hybrid.run(scene).attributes["errors_not_converged"])
-    assert found == ["curvature,bending_moment"] * 2 or found == ["curvature"] * 2
+    assert found[0] == found[1] and "curvature" in found[0].split(",")

@@ -500,19 +500,24 @@ def test_what_is_not_held_has_none() -> None:
         assert np.linalg.eigvalsh(0.5 * (cable.stiffness("start") + cable.stiffness("start").T)).min() > 0.0
 
 
-@pytest.mark.parametrize("most", [1, 2, 3])
-def test_a_step_whose_iterations_are_used_up_is_not_refused_for_its_error(most):
+@pytest.mark.parametrize(("most", "off"), [(1, 0.1), (2, 0.01), (3, 0.01)])
+def test_a_step_whose_iterations_are_used_up_is_not_refused_for_its_error(most, off):
+    """Steps are longer than where they may be refused: forces are off by 7 %, and by 0.6 % with two iterations."""
     section = {"length": 100, "mass": 50, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
     scene = {
         "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "mesh": {"cells": 20},
         "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [80, 0, 0]}},
         "initial": "equilibrium", "time": {"duration": 20}, "output": {"every": 0.5},
     }  # fmt: skip
-    with hybrid.Simulation(scene, most_iterations=most) as cable:
-        while cable.t < 10.0:
-            t, part = cable.t + 0.2, 0.5 * min(cable.t / 4, 1) ** 2
-            cable.set_end("end", [80 + part * np.sin(0.7 * t), 0, part * np.sin(0.9 * t)])
-            cable.advance(t)
+    forces = []
+    for allowed in (most, None):
+        with hybrid.Simulation(scene, most_iterations=allowed) as cable:
+            while cable.t < 10.0:
+                t, part = cable.t + 0.2, 0.5 * min(cable.t / 4, 1) ** 2
+                cable.set_end("end", [80 + part * np.sin(0.7 * t), 0, part * np.sin(0.9 * t)])
+                cable.advance(t)
+            forces.append(cable.forces().end)
+    assert np.linalg.norm(forces[0] - forces[1]) < off * np.linalg.norm(forces[1])
 
 
 @pytest.mark.parametrize("most", [1, 2])

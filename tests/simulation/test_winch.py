@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -381,40 +380,28 @@ def test_a_rope_under_friction_with_its_ends_exchanged() -> None:
     assert np.abs(one.position - other.position[:, ::-1]).max() < 1e-5
 
 
+def let_go(payout, thrust, until, mass=1e-6, duration=4.0, step=0.1, every=0.5):
+    """80 kg on 40 m of line from a winch at its end, under a thrust (N) down that ends at a time (s)."""
+    body = {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -thrust], "until": until}}
+    winch = pinned_at(0, 0, 0, payout=payout)
+    section = {"length": 40.0, "mass": mass}
+    return cable_scene(section, body, winch, model="catenary", mesh=20, time=(duration, step), output={"every": every})
+
+
 @pytest.mark.parametrize("step", [0.1, 0.05])
 def test_a_winch_goes_on_with_the_pull_behind_a_jump_of_load(step):
     """(I + M) dc/dt = M g - T from when the thrust ends on."""
     winch = {"tension": 80.0 * 9.81 + 200.0, "inertia": 100.0, "ramp": 1.0}
-    scene = {
-        "cable": {"sections": [{"length": 40.0, "mass": 1e-6}]},
-        "ends": {
-            "start": {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -200.0], "until": 3.0}},
-            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 90.0, "winch": winch}},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": 6.0, "step": step}, "output": {"every": 0.5},
-    }  # fmt: skip
-    result = hybrid.run(scene)
+    result = hybrid.run(let_go({"longest": 90.0, "winch": winch}, 200.0, 3.0, duration=6.0, step=step))
     late = np.maximum(result.t - 3.0, 0.0)
     assert np.abs(result["payout/rate"] + 200.0 / 180.0 * late).max() < 1e-4
     assert np.abs(result["payout/length"] - 40.0 + 100.0 / 180.0 * late**2).max() < 5e-4
 
 
 def test_a_run_that_is_resumed_where_a_load_jumps_is_the_same(tmp_path):
-    winch = {"tension": 80.0 * 9.81, "inertia": 100.0, "ramp": 1.0}
-    scene = {
-        "cable": {"sections": [{"length": 40.0, "mass": 1e-6}]},
-        "ends": {
-            "start": {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -600.0], "until": 3.0}},
-            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 120.0, "winch": winch}},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 0.5},
-    }  # fmt: skip
-    part = deepcopy(scene)
-    part["time"]["duration"] = 3.0
-    hybrid.run(part, output=tmp_path / "part.h5")
-    one, other = hybrid.run(scene), hybrid.resume(tmp_path / "part.h5", until=4.0)
+    payout = {"longest": 120.0, "winch": {"tension": 80.0 * 9.81, "inertia": 100.0, "ramp": 1.0}}
+    hybrid.run(let_go(payout, 600.0, 3.0, duration=3.0), output=tmp_path / "part.h5")
+    one, other = hybrid.run(let_go(payout, 600.0, 3.0)), hybrid.resume(tmp_path / "part.h5", until=4.0)
     assert np.abs(one["payout/rate"] - other["payout/rate"]).max() < 1e-9
 
 
@@ -423,14 +410,5 @@ def test_a_run_that_is_resumed_where_a_load_jumps_is_the_same(tmp_path):
     [{"longest": 120.0, "winch": {"tension": 2746.8, "inertia": 100.0, "ramp": 1.0}}, {"rate": 2.0, "ramp": 1.0}],
 )
 def test_a_node_that_enters_behind_a_jump_of_load_leaves_the_pull_at_the_winch(payout):
-    scene = {
-        "cable": {"sections": [{"length": 40.0, "mass": 5.0}]},
-        "ends": {
-            "start": {"kind": "body", "mass": 80.0, "volume": 0.0, "thrust": {"value": [0, 0, -600.0], "until": 2.0}},
-            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout},
-        },
-        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
-        "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 0.1},
-    }  # fmt: skip
-    found = hybrid.run(scene)
+    found = hybrid.run(let_go(payout, 600.0, 2.0, mass=5.0, every=0.1))
     assert np.linalg.norm(found["reaction_end"], axis=1).min() > 2000.0

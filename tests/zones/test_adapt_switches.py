@@ -19,6 +19,7 @@ from hybrid.simulation.cell_changes import CellChanges
 from hybrid.store.reader import Result
 from hybrid.zones import change as zone_changes
 from tests.combinations.pairs import FEATURES, SECTION
+from tests.inside import calls_of
 from tests.problems import tables_with
 from tests.scenes import cable_scene, pinned_at
 
@@ -243,3 +244,26 @@ def test_obstacles_that_move_through_changes_of_cells(every: float, monkeypatch:
     ):
         one, other = (x[name] for x in found)
         np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(other).max(), err_msg=name)
+
+
+@pytest.mark.parametrize("cells", [{}, {"curvature_error": 0.05}])
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"axial_stiffness": None, "tension_strain": [[0, 0], [1e-4, 12.0], [3e-4, 30.0], [1e-2, 900.0]]},
+        {"bending_stiffness": None, "moment_curvature": [[0, 0], [0.2, 0.128], [2, 0.5]]},
+        {"tension_torque": 2e-3},
+        {"dynamic_stiffness": {"constant": 2e5, "per_tension": 10.0, "relaxation_time": 2.0}},
+    ],
+)
+def test_zones_of_lines_with_laws_change_in_place_as_with_a_new_solver(
+    law: dict, cells: dict, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = calls_of(monkeypatch, CellChanges, "change")
+    found = []
+    for may_change in (CellChanges.may_change, lambda *_: False):
+        monkeypatch.setattr(CellChanges, "may_change", may_change)
+        found.append(hybrid.run(sagging(model=cells, **law)))
+    assert calls
+    for name in ("position", "tension", "work/zones", "energy/stretch", "curvature"):
+        np.testing.assert_array_equal(found[0][name], found[1][name], err_msg=name)

@@ -345,8 +345,9 @@ def assemble_junctions(network, m):
         job = read(tables[l])
         hand_over(l, job, network, cv)
         for b in range(3 if start >= 0 else 0):
+            lag = lag_of_start(l, job, network, b)
             for e in range(RIGHT):
-                network.S[e, RIGHT] -= network.S[e, AT[START] + b] * lag_of_start(l, job, network, b)
+                network.S[e, RIGHT] -= network.S[e, AT[START] + b] * lag
         spread(l, job, network, tensions, row if end != NONE else -1, m)
         if end != NONE:
             row += 1
@@ -422,7 +423,10 @@ def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
 
 @inner
 def correct_all(network, gaps, m, lags):
-    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
+    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite.
+
+    lags: whether starts have still to go what their rounded places leave out.
+    """
     tables, joints, seats, arms = network.tables, network.joints, network.seats, network.arms
     points = network.net.shape[0]
     columns, work, A, q = network.columns, network.work, network.A, network.q

@@ -353,10 +353,9 @@ def pass_torque(line, ends, state, work, part, cv):
         report_end_moments(line, ends, state, work.report)
         work.torsion.known[OF_STEP] = 0.0
     elif felt and part == CORRECT:
-        joined = ends.held[1] == JOINED or (
-            ends.held[1] != 0 and ends.held[0] == JOINED
-        )  # kernels.junctions.borders.HELD
-        correct(line, state, work, cv, joined)
+        # the last block is left unsolved, too, where the end is held and the start is joined (junctions.borders.HELD)
+        leaves = ends.held[1] == JOINED or (ends.held[1] != 0 and ends.held[0] == JOINED)
+        correct(line, state, work, cv, leaves)
     elif felt:
         known = work.torsion.known
         known[OF_STEP] += 1.0

@@ -524,9 +524,10 @@ def run_network(table):
                 return REGROUP
 
 
-@inner
-def renew_pulls(steps):
-    """Bodies feel lines with the cells of now: their forces, and the power from which the work of these goes on."""
+@kernel(inlined=False)
+def renew_pulls(table):
+    """Bodies feel lines whose cells have changed: their forces, and the power from which the work of these goes on."""
+    steps = read_steps(table)
     network = read_network(steps.odd if steps.counts.parity else steps.even)
     bodies, work = network.old, network.work
     if work.shape[0] == 0 or network.rides.shape[0] > 0:  # what presses on shapes of bodies is not known again
@@ -540,12 +541,6 @@ def renew_pulls(steps):
         work[b, BEFORE] = work[b, POWER]
         for k in range(work.shape[1]):
             steps.worked[0, b, k] = work[b, k]
-
-
-@kernel
-def pull_anew(table):
-    """The same of a table of `StepsJob`, where Python has changed cells."""
-    renew_pulls(read_steps(table))
 
 
 @kernel
@@ -565,5 +560,5 @@ def run_lines(table):
             done = change_lines(steps.nodes_due, steps.reels, steps.reeled, steps.node_asker, steps.reeler)
         if done == 0:
             return STEPPED
-        renew_pulls(steps)
+        renew_pulls(table)
         steps.counts.notices = 0
