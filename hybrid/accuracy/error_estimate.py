@@ -103,7 +103,7 @@ class Estimate:
     An error of order p is k^p times as large on cells k times as long.
     """
 
-    length = 0.0  # m, as of `__init__`
+    length = 0.0  # m, of the line, which positions are parts of; 0: not known, they are of the largest coordinate
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
     between: Mapping[str, Between] = MappingProxyType({})  # of end forces whose outputs do not show all that they do
     _apart: RunSample | None = None  # a finer run that is no better, from which the result is not less far than it is
@@ -117,16 +117,14 @@ class Estimate:
         coarsest: RunSample | None,
         from_rest: bool = True,
         rubs: bool = False,
-        length: float = 0.0,
     ) -> None:
         """coarse: longer cells, and steps if there are any; rough: its cells, steps longer still; coarsest: both.
 
         None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.  rubs: on obstacles.
-        length: m, of the line, which positions are parts of; 0: not known, they are of the largest coordinate.
         """
         self._include(result)
         self.shares_mixed = set[str]()
-        self._from_rest, self._rubs, self.length = from_rest, rubs, length
+        self._from_rest, self._rubs = from_rest, rubs
         both = [name for name in result.values if name in coarse.values]
         fall = {name: _halved_falls(name, result, coarse, rough, coarsest) for name in both}
         own = [name for name in both if name in END_FORCES and not from_rest]  # with an order at the start

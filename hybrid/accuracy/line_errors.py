@@ -238,7 +238,8 @@ class LineErrors:
         if self.comparisons is None:
             self.own_notes += result.notes
             return False
-        estimate = Estimate(result, *self.comparisons, self.from_rest, self.rubs, self.length)
+        estimate = Estimate(result, *self.comparisons, self.from_rest, self.rubs)
+        estimate.length = self.length
         if estimate.share_unknown and (run := faster()) is not None:
             estimate.show_steps(run)
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)
