@@ -28,7 +28,7 @@ import hybrid
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.mesh import Zone
 from hybrid.scene.read import one_line
-from hybrid.zones import change as zoning
+from hybrid.simulation.cell_changes import CellChanges
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -183,20 +183,21 @@ class Watched:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.rows: list[tuple[float, float, float, float]] = []
-        switch = zoning.ZoneSwitching.switch
+        change = CellChanges.change
 
-        def watched(manager: zoning.ZoneSwitching, *what: Any) -> Any:
-            line, state = manager.model.line, what[3]
+        def watched(cells: CellChanges, *what: Any) -> float:
+            k, n, parity = cells.side, cells.cells, int(cells._run.loop.counts.parity)
+            line, state = cells.line(k, n), cells.state(k, parity, n)
             m, p = line.mass.sum(), line.mass @ state.v
             speed = line.mass @ np.linalg.norm(state.v, axis=1)
-            out = switch(manager, *what)
-            new, after, booked = out
-            moved = float(np.linalg.norm(new.line.mass @ after.v - p)) / max(speed, 1e-300)
-            true = float(abs(manager.zones.true.sum() - line.s[-1])) / line.s[-1]
-            self.rows.append((true, float(abs(new.line.mass.sum() - m)) / m, moved, booked))
-            return out
+            booked = change(cells, *what)
+            new, after = cells.line(cells.side, cells.cells), cells.state(cells.side, 0, cells.cells)
+            moved = float(np.linalg.norm(new.mass @ after.v - p)) / max(speed, 1e-300)
+            true = float(abs(cells._zones_on(cells.side, cells.cells).true.sum() - line.s[-1])) / line.s[-1]
+            self.rows.append((true, float(abs(new.mass.sum() - m)) / m, moved, booked))
+            return booked
 
-        monkeypatch.setattr(zoning.ZoneSwitching, "switch", watched)
+        monkeypatch.setattr(CellChanges, "change", watched)
 
 
 SWITCHING = ("s_tether", "touchdown", "laying", "slack_on_seabed", "irregular_sea")

@@ -20,8 +20,6 @@ import hybrid
 from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.simulation import cell_changes
 from hybrid.simulation.cell_changes import CellChanges
-from hybrid.zones import change as zone_change
-from hybrid.zones.change import transfer_to
 from tests.inside import OnlyLine, never_due
 
 pytestmark = pytest.mark.bench
@@ -133,7 +131,7 @@ def fast_edge() -> dict[str, Any]:
 def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
     """Of all changes from now on what momentum changes by, over the mass of the line, and the largest speed, m/s."""
     found: list[tuple[float, float]] = []
-    change, transfer = CellChanges.change, zone_change.begin_switch
+    change, once = CellChanges.change, CellChanges.change_once
 
     def note(line: Any, state: Any, target: Any, out: Any) -> None:
         off = np.linalg.norm(target.mass @ out.v - line.mass @ state.v) / line.mass.sum()
@@ -146,22 +144,15 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
         note(self.line(k, n), self.state(k, parity, n), self.line(to, m), self.state(to, 0, m))
         return booked
 
-    def in_python(*given: Any, **named: Any) -> Any:
-        job = transfer_to(*given, **named)
-        jobs.append(job)
-        return job
-
-    def begin(numbers: Any) -> Any:
-        done = transfer(numbers)
-        job = jobs.pop()
-        note(job.line, job.state, job.target, job.out)
+    def in_python(self: CellChanges, *given: Any) -> Any:
+        line, state = self.line(0, 0), self.state(0, 0, 0)
+        done = once(self, *given)
+        note(line, state, done[0].line, done[1])
         return done
 
-    jobs: list[Any] = []
     monkeypatch.setattr(CellChanges, "change", compiled)
     monkeypatch.setattr(cell_changes, "cells_due", never_due)
-    monkeypatch.setattr(zone_change, "transfer_to", in_python)
-    monkeypatch.setattr(zone_change, "begin_switch", begin)
+    monkeypatch.setattr(CellChanges, "change_once", in_python)
     return found
 
 

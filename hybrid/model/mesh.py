@@ -20,7 +20,7 @@ from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.remesh import Cable, blank_kinds_job, blank_line_job, fill_kinds
 from hybrid.kernels.mesh.zone_criteria import NodeKinds, blank_kinds
 from hybrid.kernels.state.state import NO_MOVED, NO_PLANE, Floats, Line
-from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
+from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points, torsion_zones
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material, nodes_at
 
 MOST_CELLS = 1_000_000
@@ -373,18 +373,23 @@ class LineOnBase:
         """(2,) whether ends turn freely."""
         return np.asarray(self._material.hinges[:2, 0] > 0.0)
 
-    @property
-    def cable(self) -> Cable:
-        """What lines are made of; its points are those of the forces that the last line had."""
-        return self._cable
-
-    def line(self, layout: Layout, bits: int, plane: Floats = NO_PLANE, moved: NDArray[np.int8] = NO_MOVED) -> Line:
-        """The line on a layout; bits: all forces that are on; moved: as of `Line`, of the obstacles around it."""
+    def cable_with(self, bits: int) -> Cable:
+        """What lines with these forces (bits) are made of."""
         if bits != self._bits:
             put_points(self._material, self._place, self._cable, bits)
             self._bits = bits
-        cells = layout.base_of_cell, layout.rod_cells
-        return on_base(self._material, self._cable, layout.nodes, cells, bits, self._line_job, plane, moved)
+        return self._cable
+
+    def torsion(self, layout: Layout) -> Floats:
+        """Zones (K, 5) of the line on a layout that a torque passes through, as `Line.torsion`."""
+        s = layout.nodes
+        of = self._material.piece(0.5 * (s[:-1] + s[1:]))
+        return torsion_zones(self._material, np.diff(s), layout.rod_cells, of)
+
+    def line(self, layout: Layout, bits: int, plane: Floats = NO_PLANE, moved: NDArray[np.int8] = NO_MOVED) -> Line:
+        """The line on a layout; bits: all forces that are on; moved: as of `Line`, of the obstacles around it."""
+        cells, cable = (layout.base_of_cell, layout.rod_cells), self.cable_with(bits)
+        return on_base(self._material, cable, layout.nodes, cells, bits, self._line_job, plane, moved)
 
     def kinds(self, layout: Layout, free: np.ndarray, scale: float) -> NodeKinds:
         """What criteria know of the nodes of a layout; free: (n,) of base cells; scale: tension scale, N."""

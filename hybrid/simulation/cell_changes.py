@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.march.zone_torque import carry_torque
 from hybrid.kernels.mesh import remesh as f
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_changes import (
@@ -22,23 +23,34 @@ from hybrid.kernels.mesh.cell_changes import (
     keep_places,
     plan_cells,
     renew,
+    renew_zones,
 )
 from hybrid.kernels.mesh.remesh import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.report import PLANAR
-from hybrid.kernels.state.state import Batch, Floats, Line, Sea
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import kinds_of
 from hybrid.outputs.observation import Output, outputs_in
-from hybrid.simulation.remesh import BOTH, PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
+from hybrid.simulation.remesh import (
+    Bound,
+    Given,
+    OfRun,
+    Part,
+    Remesh,
+    copy_fields,
+    steps_alone,
+)
 from hybrid.simulation.result_file import marks_on
 from hybrid.zones.change import ZoneSwitching
 from hybrid.zones.manager import OF_BASE, Change, all_zones
 
 LEAST_CELLS = 3  # with which tables are made
 MOST_PLACES = 20_000  # nodes of lines whose outputs may wait, in all
+LINE, SWITCH, KINDS, RENEWED = range(4)  # tables of a change
 
 
 class Cells(NamedTuple):
@@ -59,19 +71,23 @@ class CellChanges(Remesh):
 
     beside, most_waiting, per_node = ("line", "sea", "old", "new", "zones"), 256, 1
 
-    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching) -> None:
-        """Room for all; `adopt` before the first change."""
+    def __init__(self, run: OfRun, number: int, switching: ZoneSwitching, once: bool = False) -> None:
+        """Room for all; `adopt` before the first change; once: for `change_once`."""
         model, layout = run.model.models[number], run.model.models[number].zoned
         self._switching, self._marked = switching, marks_on(layout.base, run.lines[number].marked)
-        super().__init__(run, number, int((self._marked != 0).sum()))
+        super().__init__(run, number, int((self._marked != 0).sum()), once=once)
         base, most = layout.rod.size, self.most
         self.in_steps = bool(switching.zones.clock.share > 0.0)  # its cells follow the curvature
         self._hinged = model.line_maker.hinged
         self._starts, self._finest = layout.starts, layout.finest.nodes
         self._piece = model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
-        self._first = np.zeros(base + 1, np.int64), np.zeros(base + 1, np.int64)
-        self._kinds, self._zones, self._cells = ((Room(x, most), Room(x, most)) for x in (kinds_of, all_zones, layouts))
+        self._first = layout.first if once else np.zeros(base + 1, np.int64), np.zeros(base + 1, np.int64)
+        zones = switching.zones
+        self._kinds, self._zones = self._sides(kinds_of, zones.kinds), self._sides(all_zones, zones)
+        now = Cells(layout.places, model.line.s, layout.base_of_cell, layout.rod_cells)
+        self._cells = Given(now) if once else Room(layouts, most), Room(layouts, most)
         self._match = Room(matches, most)
+        self._torsion: Floats = model.line.torsion  # of the line after a change that is made once
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._shifts, self._places = np.array([not self.in_steps]), np.zeros(MOST_PLACES, np.int64)
 
@@ -94,6 +110,16 @@ class CellChanges(Remesh):
 
     # --- arrays -------------------------------------------------------------------------------------
 
+    def _shared(self, k: int) -> dict[str, Any]:
+        whole = super()._shared(k)
+        if not (self._once and k):
+            return whole
+        cable = self.model.line_maker.cable_with(self.model.line.bits)
+        return whole | {"torsion": self._torsion, "law_table": cable.law_table, "bend_table": cable.bend_table}
+
+    def _turns(self, k: int) -> Floats:
+        return np.zeros((len(self._torsion), 3)) if self._once else super()._turns(k)
+
     def _zones_on(self, k: int, cells: int) -> z.Zones:
         zones = self._switching.zones
         kinds = self._kinds[k].view(cells, free=zones.kinds.free)
@@ -114,12 +140,12 @@ class CellChanges(Remesh):
     def _line_job(self, k: int, _: int, m: int) -> dict[str, Any]:
         at, line = self._layout(1 - k, m), self.line(1 - k, m)
         cells: dict[str, Any] = {"nodes": at.s, "base_of_cell": at.of, "rod": at.rods}
-        return cells | {"cable": self.model.line_maker.cable, "line": line}
+        return cells | {"cable": self.model.line_maker.cable_with(line.bits), "line": line}
 
     def _kinds_job(self, k: int, _: int, m: int) -> dict[str, Any]:
         to, model = 1 - k, self.model
         return {
-            "cable": model.line_maker.cable,
+            "cable": model.line_maker.cable_with(model.line.bits),
             "base_of_cell": self._layout(to, m).of,
             "kinds": self._zones_on(to, m).kinds,
             "hinged": self._hinged,
@@ -134,9 +160,10 @@ class CellChanges(Remesh):
         lines = self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m)
         before, held = self._layout(k, n).place, (self._clamps, self._held, self._shifts)
         transfer = Transfer(*lines, before, at.place, self._first[k], switching.kinks, *held, match)
-        around: dict[str, Any] = {"ends": self.model.ends.values, "sea": self._sea_on(n), "target_sea": self._sea_on(m)}
+        around: dict[str, Any] = {"sea": self._sea_on(k, n), "target_sea": self._sea_on(to, m)}
         zones = {"zones": self._zones_on(k, n), "target_zones": self._zones_on(to, m)}
-        return around | zones | {"transfer": transfer, "numbers": self._numbers, "guided": switching.guided}
+        rest = {"ends": self.model.ends.values, "numbers": self._numbers, "guided": switching.guided}
+        return around | zones | rest | {"transfer": transfer}
 
     def _renew_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         to = 1 - k
@@ -144,12 +171,12 @@ class CellChanges(Remesh):
         found: dict[str, Any] = {"s": of_old.s, "rods": of_old.rods, "to_s": at.s, "to_rods": at.rods}
         found |= {"line": self.line(to, m), "place": at.place, "of": at.of, "first": self._first[to]}
         found |= {"marked": self._marked, "nearest": self._itself.cells, "scale": self.model.tension_scale}
-        found |= {"state": self.state(to, 0, m), "twin": self.state(to, 1, m), "sea": self._sea_on(m)}
-        found |= {"work": self._work_on(m), "zones": self._zones_on(to, m), "width": self._width(m)}
+        found |= {"state": self.state(to, 0, m), "twin": self.state(to, 1, m), "sea": self._sea_on(to, m)}
+        found |= {"work": self._work_on(to, m), "zones": self._zones_on(to, m), "width": self._width(m)}
         found |= {"before": self._books(k, n), "books": self._books(to, m), "push": self._push(k, parity, n)}
         return found | {"new_push": self._push(to, 0, m), "next_push": self._push(to, 1, m)} | self._along
 
-    def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
+    def _parts(self) -> tuple[list[Bound], list[Part], int]:
         model, envelope = self.model, self._line.envelope
         extra = int((self._marked != 0).sum())
         self._along: dict[str, Any] = {
@@ -161,20 +188,15 @@ class CellChanges(Remesh):
             "stays": np.zeros(self.most + 1, np.int64),
             "spare": np.zeros(4 * b.EXTREMES * (self.most + 1 + extra)),
         }
-        of_line, of_kinds = (
-            shaped(blank_line_job, self._line_job, *BOTH),
-            shaped(blank_kinds_job, self._kinds_job, *BOTH),
-        )
-        self._fill = of_line[1], of_line[0]  # by the side that the line is on
         tables = [
-            [of_line[k] for k, _ in PAIRS],
-            shaped(blank_switch_job, self._switch_job, *PAIRS),
-            [of_kinds[k] for k, _ in PAIRS],
-            shaped(blank_renew_job, self._renew_job, *PAIRS),
+            Bound(blank_line_job, self._line_job, by_parity=False),
+            Bound(blank_switch_job, self._switch_job),
+            Bound(blank_kinds_job, self._kinds_job, by_parity=False),
+            Bound(blank_renew_job, self._renew_job),
         ]
-        line, switch, kinds, renewed = range(4)
-        parts = [Part(clear_state, renewed), Part(fill_line, line), Part(begin_switch, switch)]
-        parts += [Part(fill_kinds, kinds), Part(end_switch, switch), Part(renew, renewed)]
+        parts = [Part(clear_state, RENEWED), Part(fill_line, LINE), Part(begin_switch, SWITCH)]
+        parts += [Part(fill_kinds, KINDS), Part(end_switch, SWITCH)]
+        parts.append(Part(renew if self._line.paying is None else renew_zones, RENEWED))
         return tables, parts, 3
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
@@ -212,15 +234,44 @@ class CellChanges(Remesh):
         switching.zones.next_rod[:] = change.rod
         if self.in_steps:
             z.plan_next(switching.table.numbers)
-        ends = self.model.ends.at_time(t)
-        self._solver.place_frames(self._number, self._run.state.bodies)
-        self._clamps[:], self._held[:] = switching.clamps(ends)
+        self._place_clamps()
         booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
         manager.use_cells_of(manager.layout._replace(rod=change.rod.copy()), self._zones_on(self.side, self.cells))
         clock = switching.zones.clock
         self._run.loop.clock.allowed = clock.ramp_step if manager.ramping else clock.steady_step
         self.sync()
         return booked
+
+    def _place_clamps(self) -> Ends:
+        """Ends, and what holds the twist of them, are as they are now."""
+        ends = self.model.ends.at_time(self._run.t)
+        self._solver.place_frames(self._number, self._run.state.bodies)
+        self._clamps[:], self._held[:] = self._switching.clamps(ends)
+        return ends
+
+    def change_once(self, change: Change, here: np.ndarray | None = None) -> tuple[Model, State, Books, float]:
+        """Other zones in arrays of their own: the line, its state and books, and the energy, J, that it puts in.
+
+        here: (K+1,) bool, places of the finest mesh where nodes should be; None: as is planned.
+        """
+        switching, run, model = self._switching, self._run, self.model
+        manager, zones, ends, state = switching.manager, switching.zones, self._place_clamps(), self.state(0, 0, 0)
+        sea = model.sea.at_time(run.t)
+        if here is None:
+            here = zones.plan.copy() if change.same else switching.plan(change.rod, sea, ends, state)
+        layout = model.zoned._replace(rod=change.rod, here=here)
+        zones.next_rod[:], zones.plan[:] = change.rod, layout.node_flags
+        self._torsion, m = model.line_maker.torsion(layout), layout.base_of_cell.size
+
+        def adopt() -> None:
+            line, target, out = model.line, self.line(1, m), self.state(1, 0, m)
+            if zones.counts.holds_twist and not target.bits & PLANAR:
+                carry_torque(line, target, ends, state, out, np.zeros(line.s.size + 1))
+            manager.adopt_rods(change.rod, change, run.t)
+
+        self.carry_out(adopt)
+        model = self._model_of(self.line(1, m), self._sea_on(1, m))
+        return model, self.state(1, 0, m), self._books(1, m), float(self._numbers[f.AFTER] - self._numbers[f.BEFORE])
 
     def change(self, adopt: Callable[[], None] | None = None) -> float:
         """To the cells that are planned: nothing moves, and the energy, J, is booked.
@@ -239,12 +290,12 @@ class CellChanges(Remesh):
     def _outputs_of(self, batch: Batch, cells: int, begin: int) -> tuple[list[Output], int]:
         """With nodes at places of the finest mesh that are kept, in the arrays that are not in use."""
         model, k, places = self.model, 1 - self.side, self._places[begin : begin + cells + 1]
-        at, table = self._layout(k, cells), self._fill[k].table.numbers
+        at, fill = self._layout(k, cells), self._change[LINE][2 * (1 - k)]
         at.place[:], at.s[:] = places, self._finest[places]
         at.of[:] = np.searchsorted(self._starts, places[:-1], "right") - 1
         at.rods[:] = model.zoned.rod[at.of]
-        table[:] = self._fill[k].of(0, cells)
-        fill_line(table)
+        fill.table.numbers[:] = fill.of(0, cells)
+        fill_line(fill.table.numbers)
         return outputs_in(batch, self.line(k, cells), model.zones), begin + cells + 1
 
     def _outputs_now(self, batch: Batch) -> list[Output]:

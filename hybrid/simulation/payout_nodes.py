@@ -34,7 +34,7 @@ from hybrid.kernels.state.state import Batch, Line, Sea
 from hybrid.model.build import Model
 from hybrid.model.line import lines_like, of_whole_line
 from hybrid.outputs.observation import Output
-from hybrid.simulation.remesh import PAIRS, OfRun, Part, Remesh, Shaped, copy_fields, shaped, steps_alone
+from hybrid.simulation.remesh import Bound, OfRun, Part, Remesh, copy_fields, steps_alone
 from hybrid.simulation.result_file import marks_on
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
@@ -90,7 +90,7 @@ class NodeChanges(Remesh):
         return self._paying.table, blank_reel_job
 
     def _in_beside(self, k: int, _: int, m: int) -> dict[str, Any]:
-        work = self._work_on(m)
+        work = self._work_on(k, m)
         reel = self._reel(k, m)
         return self._states_on(k, m) | {"report": work.report, "reel": reel, "X": work.X, "W": work.W}
 
@@ -100,23 +100,22 @@ class NodeChanges(Remesh):
         lines = self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m)
         reels = self._reel(k, n), self._reel(to, m), self._run.loop.clock
         carry = CarryJob(*lines, *reels, before.tension, self._paying.plan.nodes)
-        around = model.ends.values, self._sea_on(m), self._work_on(m), self.state(to, 1, m), before, self._books(to, m)
+        around = model.ends.values, self._sea_on(to, m), self._work_on(to, m), self.state(to, 1, m)
         pushes = self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m)
         rest = self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale
-        job = NodeJob(carry, self._whole, *(*around, *pushes, *rest))
+        job = NodeJob(carry, self._whole, *(*around, before, self._books(to, m), *pushes, *rest))
         return job._asdict()
 
-    def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
+    def _parts(self) -> tuple[list[Bound], list[Part], int]:
         envelope, plan, most = self._line.envelope, self._paying.plan, self.most + 2
         way = slice(None, None, 1 if plan.side else -1)
         borne = np.ascontiguousarray(1.0 + plan.cable.max_strain[way])
         self._along = borne, np.ascontiguousarray(plan.cable.outer_diameter[way]), envelope.start, envelope.bounds
         self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
-        nodes = shaped(blank_node_job, self._node_job, *PAIRS)
         # the table of `carry_node` begins that of the others
         parts = [Part(x, 0) for x in (change_line, carry_node, fit_changed, book_change, renew_run)]
         self._calls.stand = stand_still.address(self._paying.table.numbers)
-        return [nodes], parts, 2
+        return [Bound(blank_node_job, self._node_job)], parts, 2
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
         tables = []

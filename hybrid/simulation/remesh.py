@@ -6,6 +6,10 @@ Two sets of arrays, the sides, take turns: a change goes from one to the other (
 of the run get the numbers of the other one.  What Python has of the line is made anew when the run comes back
 (`sync`). A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes
 at a winch, where zones stay (simulation.payout_nodes).
+
+Where more than steps and watches knows of the cells (lines that touch, torque through zones, winches with zones) the
+same parts of a change are carried out once (`carry_out`), from what the run has to arrays of their own, and another
+solver follows.
 """
 
 from __future__ import annotations
@@ -174,6 +178,14 @@ class Part(NamedTuple):
     table: int
 
 
+class Bound(NamedTuple):
+    """A table of a change: its blank, and what it is bound to."""
+
+    blank: Callable[[], Any]
+    values: Callable[..., dict[str, Any]]  # of the old side, the parity, old and new cells
+    by_parity: bool = True  # else the parity of the state is not asked for
+
+
 class Shaped:
     """A table whose numbers follow from the number of cells of the old and of the new line."""
 
@@ -209,6 +221,36 @@ class Shaped:
         return np.concatenate([np.arange(at.start, at.stop) for at in parts])
 
 
+class HasView(Protocol):
+    """Makes arrays for a number of cells, as `Room`."""
+
+    def view(self, cells: int, **given: Any) -> Any: ...
+
+
+class Given:
+    """The side before a change that is made once: what the run has."""
+
+    def __init__(self, value: Any) -> None:
+        self._value = value
+
+    def view(self, cells: int, **_: Any) -> Any:
+        """What it is, of so many cells."""
+        return self._value
+
+
+class Made:
+    """The side after it: arrays of their own for each number of cells."""
+
+    def __init__(self, packed: Packed) -> None:
+        self._packed, self._made = packed, dict[int, Any]()
+
+    def view(self, cells: int, **given: Any) -> Any:
+        """Those for so many cells, the same whenever they are asked for."""
+        if cells not in self._made:
+            self._made[cells] = self._packed(cells, **given)
+        return self._made[cells]
+
+
 def shaped(blank: Callable[[], Any], values: Callable[..., dict[str, Any]], *of: tuple[int, ...]) -> list[Shaped]:
     """Tables of arrays of the same shapes, that differ by their addresses; of: what `values` gets before the cells."""
     found: list[Shaped] = []
@@ -220,6 +262,14 @@ def shaped(blank: Callable[[], Any], values: Callable[..., dict[str, Any]], *of:
 BOTH, PAIRS = ((0,), (1,)), ((0, 0), (0, 1), (1, 0), (1, 1))  # sides; old sides and parities
 
 
+def tables_of(bound: Bound) -> list[Shaped]:
+    """Tables of a change from each of PAIRS."""
+    if bound.by_parity:
+        return shaped(bound.blank, bound.values, *PAIRS)
+    of_side = shaped(bound.blank, bound.values, *BOTH)
+    return [of_side[k] for k, _ in PAIRS]
+
+
 class Remesh:
     """Changes of the cells of a line of a run, from one side of arrays to the other, with the solver of now."""
 
@@ -228,32 +278,38 @@ class Remesh:
     per_node = 0  # numbers of a node that are kept for them, at most
     in_steps = True  # whether steps change cells without Python
 
-    def __init__(self, run: OfRun, number: int, marked: int, twice: bool = False) -> None:
+    def __init__(self, run: OfRun, number: int, marked: int, twice: bool = False, once: bool = False) -> None:
         """Room for the most cells; `adopt` before the first change.
 
-        marked: nodes beside which extremes are kept on both sides; twice: as of `workspace`.
+        marked: nodes beside which extremes are kept on both sides; twice: as of `workspace`; once: for `carry_out`.
         """
         self._run, self._number, self._line, self._solver = run, number, run.lines[number], run.solver
-        self._alone, self._pairs = run.solver.tables_beside(number)
-        self._limits, self._fixed_to = run.solver.limits_by_itself(number), self._key()
-        self.most = most = self.model.most_cells
-        kept = kept_of(marked)
-        line, sea = self.model.line, self.model.sea.values
-        of_lines, of_states = lines_like(line), states_with(*memory_of(line))
-        self._lines = Room(of_lines, most), Room(of_lines, most)
-        self._states = tuple((Room(of_states, most), Room(of_states, most)) for _ in range(2))
-        self._pushes, self._kept = (Room(of_pushes, most), Room(of_pushes, most)), (Room(kept, most), Room(kept, most))
-        self._sea = Room(seas_with(sea.grip.shape[1], len(sea.rolling)), most)
-        self._work = Room(Packed(run.solver.room_beside(number, twice), given=("torsion",)), most)
+        self._once, self.most = once, run.model.models[number].most_cells
+        self._fixed_to, most = self._key(), self.most
+        line, sea, state = self.model.line, self.model.sea.values, run.state.lines[number]
+        self._lines = self._sides(lines_like(line), line)
+        of_states = states_with(*memory_of(line))
+        pairs = [self._sides(of_states, state) for _ in range(2)]
+        self._states = [(even, odd) for even, odd in zip(*pairs, strict=True)]
+        self._pushes, self._kept = self._sides(of_pushes, None), self._sides(kept_of(marked), self._line.books)
+        self._sea = self._sides(seas_with(sea.grip.shape[1], len(sea.rolling)), sea, one=True)
+        self._work = self._sides(Packed(run.solver.room_beside(number, twice), given=("torsion",)), None, one=True)
         self._base = np.zeros(self._line.books.base.size, np.int64)
-        self._watch_table = self._line.watch_table  # None: nobody watches how near the line comes to itself
-        self._watch = watch_beside(self._line)
+        self._watch_table = None if once else self._line.watch_table  # None: nobody watches how near it comes to itself
+        self._watch = None if once else watch_beside(self._line)
         width = np.zeros(most) if self._watch is None else self._watch.width_of(number)
         self._itself: Itself = blank_itself(width)._replace(width=width)
         self._calls, self._at, self._numbers = f.RemeshCalls(), f.RemeshPlaces(), np.zeros(f.NUMBERS)
         self._waiting = np.zeros((self.most_waiting, 3), np.int64)
         self._table = Table(f.blank_remesh_job)
         self._synced, self._bound = -1, False
+
+    def _sides(self, packed: Packed, before: Any, one: bool = False) -> tuple[HasView, HasView]:
+        """Arrays before a change and after it; before: what the run has; one: in memory that they share."""
+        if self._once:
+            return Given(before), Made(packed)
+        room = Room(packed, self.most)
+        return room, room if one else Room(packed, self.most)
 
     # --- what a planner says ------------------------------------------------------------------------
 
@@ -269,8 +325,8 @@ class Remesh:
         """What depends on the cells there, with m of them in the arrays of side k."""
         raise NotImplementedError
 
-    def _tables_of_change(self) -> tuple[list[list[Shaped]], list[Part], int]:
-        """Tables of a change from each of PAIRS, its parts, and how many come before others hear of it."""
+    def _parts(self) -> tuple[list[Bound], list[Part], int]:
+        """Tables of a change, its parts, and how many come before others hear of it."""
         raise NotImplementedError
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
@@ -303,7 +359,7 @@ class Remesh:
     @property
     def pushes(self) -> tuple[Floats, Floats]:
         """Out of its plane, of states of even and of odd parity; empty: none."""
-        return (NO_PUSH, NO_PUSH) if self._line.plane is None else self._line.plane.pushes
+        return (NO_PUSH, NO_PUSH) if self._line.plane is None or self._once else self._line.plane.pushes
 
     @property
     def side(self) -> int:
@@ -336,28 +392,42 @@ class Remesh:
 
     def line(self, k: int, cells: int) -> Line:
         """The line of side k."""
-        return self._lines[k].view(cells, **of_whole_line(self.model.line))
+        line: Line = self._lines[k].view(cells, **self._shared(k))
+        return line
 
     def state(self, k: int, which: int, cells: int) -> State:
         """The state of side k of even (which = 0) or odd parity (1)."""
-        return self._states[k][which].view(cells, turn=NO_TURN)
+        state: State = self._states[k][which].view(cells, turn=self._turns(k))
+        return state
+
+    def _shared(self, _: int) -> dict[str, Any]:
+        """What the line of a side has as a whole, by name."""
+        return of_whole_line(self.model.line)
+
+    def _turns(self, _: int) -> Floats:
+        """Of its zones that a torque passes through."""
+        return NO_TURN
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
         if not self.pushes[0].size:
             return NO_PUSH
-        return self._pushes[k].view(cells)[which]
+        push: Floats = self._pushes[k].view(cells)[which]
+        return push
 
-    def _sea_on(self, cells: int) -> Sea:
+    def _sea_on(self, k: int, cells: int) -> Sea:
         values = self.model.sea.values
-        return self._sea.view(cells, **{x: getattr(values, x) for x in REST_OF_SEA})
+        sea: Sea = self._sea[k].view(cells, **{x: getattr(values, x) for x in REST_OF_SEA})
+        return sea
 
-    def _work_on(self, cells: int) -> Work:
-        return self._work.view(cells, torsion=self._solver.work[self._number].torsion)
+    def _work_on(self, k: int, cells: int) -> Work:
+        work: Work = self._work[k].view(cells, torsion=self._solver.work[self._number].torsion)
+        return work
 
     def _books(self, k: int, cells: int) -> Books:
         given = {name: getattr(self._line.books, name) for name in REST_OF_BOOKS} | {"base": self._base}
-        return self._kept[k].view(cells, **given)
+        books: Books = self._kept[k].view(cells, **given)
+        return books
 
     def _width(self, cells: int) -> Floats:
         """Diameters of cells; none where nobody watches whether the line meets itself or others."""
@@ -368,11 +438,11 @@ class Remesh:
 
     def _states_on(self, k: int, m: int) -> dict[str, Any]:
         states: dict[str, Any] = {"old": self.state(k, 0, m), "new": self.state(k, 1, m)}
-        return states | {"line": self.line(k, m), "sea": self._sea_on(m)}
+        return states | {"line": self.line(k, m), "sea": self._sea_on(k, m)}
 
     def _in_run(self, k: int, _: int, m: int) -> dict[str, Any]:
         pushes = {"was": self._push(k, 0, m), "now": self._push(k, 1, m)}
-        return self._states_on(k, m) | pushes | {"work": self._work_on(m), "books": self._books(k, m)}
+        return self._states_on(k, m) | pushes | {"work": self._work_on(k, m), "books": self._books(k, m)}
 
     def _in_odd(self, k: int, _: int, m: int) -> dict[str, Any]:
         found = self._in_run(k, _, m)
@@ -385,9 +455,11 @@ class Remesh:
     def _bind_all(self) -> None:
         """Tables of changes from either side to the other, and of runs on either."""
         run, at, books, (beside, blank) = self._run, self._at, self._line.books, self._beside_table()
+        self._alone, self._pairs = run.solver.tables_beside(self._number)
         of_run, of_odd = (shaped(blank_job, x, *BOTH) for x in (self._in_run, self._in_odd))
         of_beside = shaped(blank, self._in_beside, *BOTH)
-        change, parts, at.begun = self._tables_of_change()
+        bound, parts, at.begun = self._parts()
+        self._change = change = [tables_of(x) for x in bound]
         (due, plan, keep), planners, at.room = self._planner()
         in_run, in_beside = of_run[0].places(IN_RUN), of_beside[0].places(self.beside)
         numbers = dict[str, Any]() if self._watch is None else self._watch.distances
@@ -415,13 +487,34 @@ class Remesh:
         self._table.bind(run=self._alone.numbers, run_places=in_run, beside=beside.numbers, beside_places=in_beside)
         self._table.bind(**numbers)
         forces, where = Table(blank_job), self._alone.part("task")
-        forces.bind(task=Task(ASSEMBLY, ca=HEAVY, limits=self._limits))
+        limits = run.solver.limits_by_itself(self._number)
+        forces.bind(task=Task(ASSEMBLY, ca=HEAVY, limits=limits))
         self._table.bind(task=forces.numbers[where].copy())
         at.task, at.per_node, at.number = where.start, self.per_node, self._number
         for name, kernel in (("due", due), ("plan", plan), ("keep", keep)):
             setattr(self._calls, name, kernel.address(planners[0].numbers))
         for name, kernel in (("before_forces", before_forces), ("after_forces", after_forces), ("books", begin_line)):
             setattr(self._calls, name, kernel.address(self._alone.numbers))
+
+    # --- once ---------------------------------------------------------------------------------------
+
+    def carry_out(self, between: Callable[[], None] | None = None) -> None:
+        """A change from what the run has to arrays of their own, before another solver makes the steps.
+
+        between: what is to be done when others are to hear of it.
+        """
+        (_, plan, _), planners, _ = self._planner()
+        bound, parts, begun = self._parts()
+        at, n = self._at, self.model.cells
+        at.cells, at.next_cells = n, plan(planners[0].numbers)
+        tables = [Table(x.blank) for x in bound]
+        for table, x in zip(tables, bound, strict=True):
+            table.bind(**x.values(*(0, 0)[: 1 + x.by_parity], n, int(at.next_cells)))
+        for k, part in enumerate(parts):
+            if k == begun and between is not None:
+                between()
+            part.kernel(tables[part.table].numbers)
+        at.side, at.cells = 1, at.next_cells
 
     # --- steps --------------------------------------------------------------------------------------
 
@@ -439,8 +532,8 @@ class Remesh:
             if pushes[which].size:
                 self._push(0, which, n)[:] = pushes[which]
         copy_fields(model.line, self.line(0, n), OF_WHOLE_LINE)
-        copy_fields(model.sea.values, self._sea_on(n), REST_OF_SEA)
-        copy_fields(work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        copy_fields(model.sea.values, self._sea_on(0, n), REST_OF_SEA)
+        copy_fields(work, self._work_on(0, n), ("W", "X", "x", "torsion", "gaps", "rows"))
         self._base[:] = books.base
         if self._watch_table is not None:
             itself = self._line.envelope.itself.itself
@@ -459,7 +552,7 @@ class Remesh:
             return
         self._synced = int(self._at.changes)
         k, n = self.side, self.cells
-        line, sea, work, books = self.line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n)
+        line, sea, work, books = self.line(k, n), self._sea_on(k, n), self._work_on(k, n), self._books(k, n)
         now = sea.now.copy()
         model = self._model_of(line, sea)
         sea.now[:] = now

@@ -343,10 +343,13 @@ class RunLine:
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
 
-    def use_cells(self, model: Model, extremes: bool = True) -> None:
-        """Go on with other cells; extremes: whether those of now count."""
+    def use_cells(self, model: Model, extremes: bool = True, books: Books | None = None) -> None:
+        """Go on with other cells; extremes: whether those of now count; books: that go with them, if they are known."""
         was, before = self.model, self.books
         self.use_model(model, other_cells=True)
+        if books is not None:
+            self.books = books._replace(touch=self._blank_touch())
+            return
         names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
         same = {name: getattr(before, name) for name in names}
         blank = self._blank_books(self.envelope.start_of(model.nodes))

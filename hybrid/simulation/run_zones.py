@@ -343,40 +343,33 @@ class RunZones(Part):
             x.cells.sync()
             note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)
         for x, change in rest:
-            self._switch(x, change)
+            self._change_once(x, change)
         if rest:
             run.go_on_changed((), AFTER_CHANGE)
 
-    def _note(self, x: _LineZones, change: Change, model: Model, booked: float) -> None:
-        """A line has changed: its energy (J) is booked, events tell, and the run has its model."""
-        run, k = self._run, x.number
-        run.lines[k].books.work[0, b.ZONES] += booked
-        note_change(run.lines[k].events, x.switching.manager, run.t, change, booked)
-        run.model = run.model.with_lines({k: model})
-
     def switch_zones(self, number: int, change: Change, here: np.ndarray | None) -> None:
-        """Give a line other zones, whose solver has still to follow; here: as of `ZoneSwitching.switch`."""
-        self._switch(next(x for x in self.lines if x.number == number), change, here)
+        """Give a line other zones, whose solver has still to follow; here: as of `CellChanges.change_once`."""
+        self._change_once(next(x for x in self.lines if x.number == number), change, here)
 
-    def _switch(self, x: _LineZones, change: Change, here: np.ndarray | None = None) -> None:
+    def _change_once(self, x: _LineZones, change: Change, here: np.ndarray | None = None) -> None:
         """Give a line other zones: nothing moves, and what changes energy is booked."""
-        run, k = self._run, x.number
+        run, k, line = self._run, x.number, self._run.lines[x.number]
+        line.write_down()  # of the zones before, and with the reel as it is
         if x.paid is not None:
-            run.lines[k].write_down()  # with the reel as it is
-            x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])
-        sea, line = run.model.models[k].sea.at_time(run.t), run.lines[k]
+            run.model = run.model.with_lines({k: x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])})
         at, risen = run.model.models[k].line.s, run.state.lines[k].T - line.books.tension[0]
-        model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea, here)
+        model, state, books, booked = CellChanges(run, k, x.switching, once=True).change_once(change, here)
         if x.paid is not None:
             x.paid.paying.fit(model, run.t)
         states = [*run.state.lines]
         states[k] = state
-        self._note(x, change, model, booked)
-        run.state = run.state._replace(lines=states)
-        line.use_cells(model)
+        run.model, run.state = run.model.with_lines({k: model}), run.state._replace(lines=states)
+        line.use_cells(model, books=books if x.paid is None else None)
         if x.paid is not None:  # a node that enters or leaves now asks for the rates of tensions, as of the old cells
             middle, old = (0.5 * (s[:-1] + s[1:]) for s in (model.line.s, at))
             line.books.tension[0] = state.T - np.interp(middle, old, risen)
+        line.books.work[0, b.ZONES] += booked
+        note_change(line.events, x.switching.manager, run.t, change, booked)
 
     def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
         """The line of this number is changed, if its zones move: it touches itself from now on, or no longer."""

@@ -18,15 +18,12 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.march.zone_torque import carry_torque
-from hybrid.kernels.mesh.cell_changes import begin_switch, blank_switch_job, end_switch
 from hybrid.kernels.mesh.cell_lengths import IDLE_STEPS
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, NUMBERS, RELAXES, TIME
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, plan_nodes, read_arcs
-from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
 from hybrid.kernels.state.report import PLANAR
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, memory_of
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.build import Model, given_zones
 from hybrid.model.material import nodes_at
 from hybrid.model.mesh import Layout, edges, on_other_parts
@@ -66,36 +63,13 @@ def states_with(*memory: Any) -> Packed:
     return Packed(lambda n: blank_state(n, 0, *memory), given=("turn",))
 
 
-NO_CLAMPS = np.zeros((2, 2, 3)), np.zeros(2, bool)
-
-
-def transfer_to(
-    old: Layout,
-    new: Layout,
-    line: Line,
-    target: Line,
-    state: State,
-    kinks: np.ndarray,
-    clamps: tuple[Floats, np.ndarray] = NO_CLAMPS,
-    shifts: bool = True,
-) -> Transfer:
-    """What carries a state from one layout to another of the same base.
-
-    line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
-    loads); clamps: as of `ZoneSwitching.clamps`; shifts: whether momentum is kept exactly.
-    """
-    out = states_with(*memory_of(target))(target.h.size, turn=np.zeros((len(target.torsion), 3)))
-    kept, match = np.array([shifts]), blank_match(line.h.size, target.h.size)
-    return Transfer(line, target, state, out, old.places, new.places, old.first, kinks, *clamps, kept, match)
-
-
 class ZoneSwitching:
     """The zones of one motion."""
 
     def __init__(self, model: Model, manager: DomainManager) -> None:
         self.model, self.manager = model, manager
         self.table = Table(blank_zone_job)  # of the compiled run
-        self._switch_table, self._plan_table = Table(blank_switch_job), Table(blank_zone_job)
+        self._plan_table = Table(blank_zone_job)
         self._review = Table(blank_review_job)
         self.guided = np.array(model.cable.held_tangent, float)
         base = manager.layout.base
@@ -218,38 +192,6 @@ class ZoneSwitching:
         if change is None and self.zones.counts.cells_due:
             change = manager.same_zones()
         return change
-
-    def switch(
-        self, change: Change, t: float, ends: Ends, state: State, sea: Sea, here: np.ndarray | None = None
-    ) -> tuple[Model, State, float]:
-        """The model and the state with other zones, and the energy (J) that the switch puts in.
-
-        here: (K+1,) bool, places of the finest mesh where nodes should be; None: as is planned.
-        """
-        old, manager, model = self.manager.layout, self.manager, self.model
-        if here is None:
-            here = self.zones.plan.copy() if change.same else self.plan(change.rod, sea, ends, state)
-        new = old._replace(rod=change.rod, here=here)
-        line = model.line
-        before = self.zones
-        changed = on_layout(model, new)
-        changed.sea.at_time(t)  # obstacles stand where they are now
-        target, numbers = changed.line, np.zeros(NUMBERS)
-        shifts = not self.zones.clock.share > 0.0
-        transfer = transfer_to(old, new, line, target, state, self.kinks, self.clamps(ends), shifts)
-        numbers[TIME], numbers[RELAXES] = t, before.counts.relaxing
-        self._switch_table.bind(transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values)
-        self._switch_table.bind(zones=before, target_zones=before, numbers=numbers, guided=self.guided)
-        begin_switch(self._switch_table.numbers)
-        if self.zones.counts.holds_twist and not target.bits & PLANAR:
-            carry_torque(line, target, ends, state, transfer.out, np.zeros(line.s.size + 1))
-        manager.adopt_rods(new.rod, change, t)
-        manager.set_layout(new)
-        self._switch_table.bind(target_zones=self.zones)
-        end_switch(self._switch_table.numbers)
-        self.zones.counts.relaxing = 1
-        self.model = changed
-        return changed, transfer.out, float(numbers[AFTER] - numbers[BEFORE])
 
     def arcs_less_chords(self, state: State) -> Floats:
         """(N,) m, by how much the chords of cells are shorter than their arcs."""

@@ -16,13 +16,13 @@ from problems import Scene, free, pinned, scene, straight
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_plan import OFF, make_plan
 from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
-from hybrid.kernels.mesh.zone_transfer import transfer
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
+from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match, transfer
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, memory_of, no_sea
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Layout
 from hybrid.scene.read import one_line
-from hybrid.zones.change import transfer_to
+from hybrid.zones.change import states_with
 from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
@@ -135,6 +135,16 @@ def drifting(s: Floats) -> Floats:
 
 
 # --- remapping -----------------------------------------------------------------------------------------
+
+
+def transfer_to(
+    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, shifts: bool = True
+) -> Transfer:
+    """What carries a state from one layout to another of the same base, without clamps; shifts: as of `Transfer`."""
+    out = states_with(*memory_of(target))(target.h.size, turn=np.zeros((len(target.torsion), 3)))
+    free = np.zeros((2, 2, 3)), np.zeros(2, bool), np.array([shifts])
+    match = blank_match(line.h.size, target.h.size)
+    return Transfer(line, target, state, out, old.places, new.places, old.first, kinks, *free, match)
 
 
 class Remapped(NamedTuple):

@@ -170,7 +170,7 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         model={"kind": "adaptive", "curvature_error": 0.03}, output={"every": 2, "points": 501, "errors": False}
     ))  # fmt: skip
     changed = calls_of(
-        monkeypatch, RunZones, "_switch", lambda x, _, how, *__: how.same and x._run.lines[0].envelope.itself.on
+        monkeypatch, RunZones, "_change_once", lambda x, _, how, *__: how.same and x._run.lines[0].envelope.itself.on
     )
     once = hybrid.run(scene)
     by_python = sum(changed)

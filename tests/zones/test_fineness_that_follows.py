@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from adapt_cases import Z, cable, followed, hanging, layout, on, state_on, still
+from adapt_cases import Z, cable, followed, hanging, layout, on, state_on, still, transfer_to
 
 import hybrid
 from hybrid.accuracy.passes import free_in
@@ -22,7 +22,6 @@ from hybrid.scene.read import one_line
 from hybrid.simulation.run_sample import compared_cells, usual_cells
 from hybrid.store.records import MeshHistory, ZoneHistory, node_bits
 from hybrid.store.records import Zone as ZoneRow
-from hybrid.zones.change import transfer_to
 from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene, pinned_at
 

@@ -240,6 +240,22 @@ def begin_anew(job, state, s, line):
     job.books.clock.wave_step, job.books.counts.parity = wave_step(line, job.scale), 0
 
 
+@inner
+def begin_zones(job):
+    """What criteria know begins anew, at the nodes that there are."""
+    zones = job.zones
+    for k in range(zones.here.shape[0]):
+        zones.here[k] = False
+    for i in range(job.place.shape[0]):
+        zones.place[i] = job.place[i]
+        zones.here[job.place[i]] = True
+    for k in range(zones.here.shape[0]):
+        if not zones.here[k]:
+            zones.waves[k] = 0.0
+    zones.clock.age, zones.clock.recent_age = 0.0, 0.0
+    zones.counts.known, zones.counts.strained, zones.counts.relaxing = 0, 0, 1
+
+
 @kernel
 def clear_state(table):
     """What a change does not carry to the cells of a catenary, and what forces have worked in."""
@@ -254,7 +270,7 @@ def clear_state(table):
 def renew(table):
     """What a run knows of its new cells, as of the beginning; what it knew of the old ones is kept where it must be."""
     job = read_renew(table)
-    zones, books, clock = job.zones, job.books, job.books.clock
+    books, clock = job.books, job.books.clock
     cells, columns = job.rods.shape[0], job.before.extremes.shape[2]
     if books.extremes.shape[1] > 0:
         match_nodes(job.s, job.rods, job.to_s, job.to_rods, job.stays)
@@ -264,19 +280,16 @@ def renew(table):
     if books.extremes.shape[1] > 0:
         carry_extremes(job.stays, cells, job.spare, columns, books.right, job.of.shape[0], books.extremes)
     begin_anew(job, job.state, job.s, job.line)
-    for k in range(zones.here.shape[0]):
-        zones.here[k] = False
-    for i in range(job.place.shape[0]):
-        zones.place[i] = job.place[i]
-        zones.here[job.place[i]] = True
-    for k in range(zones.here.shape[0]):
-        if not zones.here[k]:
-            zones.waves[k] = 0.0
+    begin_zones(job)
     for c in range(job.width.shape[0]):
         job.width[c] = job.widths[job.of[c]]
-    zones.clock.age, zones.clock.recent_age = 0.0, 0.0
-    zones.counts.known, zones.counts.strained, zones.counts.relaxing = 0, 0, 1
     clock.previous = clock.now
+
+
+@kernel
+def renew_zones(table):
+    """What criteria know of the new cells alone: of a line whose books go by what a winch may let out."""
+    begin_zones(read_renew(table))
 
 
 # --- forces ---------------------------------------------------------------------------------------
