@@ -36,6 +36,7 @@ from hybrid.kernels.state.state import (
     Sea,
     State,
     Work,
+    blank_state,
     memory_of,
     no_sea,
 )
@@ -50,7 +51,6 @@ from hybrid.solve.contact import SelfContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import HEAVY, NetworkState
-from hybrid.zones.change import states_with
 
 if TYPE_CHECKING:
     from hybrid.simulation.payout import PayingOut
@@ -163,6 +163,12 @@ def seas_with(grip: int, rolling: int) -> Packed:
         return sea._replace(grip=np.zeros((n + 1, grip)), rolling=np.zeros((rolling, n + 1, 5))) if grip else sea
 
     return Packed(one, given=REST_OF_SEA)
+
+
+@cache
+def states_with(*memory: Any) -> Packed:
+    """What makes states of lines of any number of cells; memory: as of `memory_of`."""
+    return Packed(lambda n: blank_state(n, 0, *memory), given=("turn",))
 
 
 @cache

@@ -60,9 +60,8 @@ from typing import Any
 from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels.contact.self_distance import OF_0_6, blank_itself
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.report import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SELF_CONTACT
-from hybrid.kernels.watch.extremes import Watched, fold_extremes, pass_on
+from hybrid.kernels.watch.extremes import fold_extremes
 from hybrid.model.build import as_begun
 from hybrid.model.contents import no_contact
 from hybrid.model.sections import attached, section_changes
@@ -458,15 +457,6 @@ class Envelope:
         """Take in the extremes (4, EXTREMES, N+1+K) of a mesh that ends; of no rows, before the first mesh."""
         if extremes.shape[1]:
             self.bounds[:] = self._with(nodes, extremes)
-
-    def pass_on(self, model: Model, books: Books, to_model: Model, to_books: Books) -> None:
-        """The run goes on with another mesh: extremes of nodes whose cells stay do, all others are taken in."""
-        if self._grows:
-            self.fold(model.nodes, books.extremes)
-        elif books.extremes.shape[1]:
-            old = Watched(model.line.s, _rods(model), books.right, books.extremes)
-            new = Watched(to_model.line.s, _rods(to_model), to_books.right, to_books.extremes)
-            pass_on(old, new, np.zeros(model.cells + 1, np.int64), self.s, self.bounds)
 
     def _with(self, nodes: Floats, extremes: Floats) -> Floats:
         """All extremes (4, EXTREMES, n), with those (4, EXTREMES, N+1+K) of the mesh of now."""

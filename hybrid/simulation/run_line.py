@@ -358,7 +358,7 @@ class RunLine:
         self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
         if extremes:
-            self.envelope.pass_on(was, before, model, self.books)
+            self.envelope.fold(was.nodes, before.extremes)
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""

@@ -9,21 +9,20 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.machine.binding import Packed, Table
+from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.zone_torque import carry_torque
 from hybrid.kernels.mesh.cell_lengths import IDLE_STEPS
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, plan_nodes, read_arcs
 from hybrid.kernels.state.report import PLANAR
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model, given_zones
 from hybrid.model.material import nodes_at
 from hybrid.model.mesh import Layout, edges, on_other_parts
@@ -52,15 +51,6 @@ def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
     line = model.line_maker.line(layout, model.line.bits, model.line.plane, model.line.moved)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
-
-
-# From the old zones to the new ones: the state on their nodes (kernels.mesh.zone_transfer).
-
-
-@cache
-def states_with(*memory: Any) -> Packed:
-    """What makes states of lines of any number of cells; memory: as of `memory_of`."""
-    return Packed(lambda n: blank_state(n, 0, *memory), given=("turn",))
 
 
 class ZoneSwitching:

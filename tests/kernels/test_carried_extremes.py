@@ -5,11 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels.watch.extremes import Watched, fold_extremes, pass_on
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.watch.extremes import carry_extremes, fold_extremes, fold_gone, match_nodes
 
 FINEST = np.arange(65.0)
 MARKED = (16, 48)  # places with a left and a right value
 PLACES = np.insert(FINEST, MARKED, FINEST[list(MARKED)])
+
+
+@kernel
+def carry_all(old, new, stays, places, bounds):
+    """What kernels.mesh.cell_changes.renew does with extremes, of nodes (s, rods, right, extremes)."""
+    s, rods, right, now = old
+    to_s, to_rods, to_right, out = new
+    match_nodes(s, rods, to_s, to_rods, stays)
+    fold_gone(s, now, right, stays, places, bounds)
+    carry_extremes(stays, rods.shape[0], now.reshape(now.size), now.shape[2], to_right, to_rods.shape[0], out)
 
 
 class Mesh:
@@ -39,8 +50,8 @@ class Mesh:
 
     def pass_on(self, other: Mesh, bounds: np.ndarray) -> None:
         stays = np.zeros(self.s.size, np.int64)
-        old, new = (Watched(x.s, x.rods, x.right, x.extremes) for x in (self, other))
-        pass_on(old, new, stays, PLACES, bounds)
+        old, new = ((x.s, x.rods, x.right, x.extremes) for x in (self, other))
+        carry_all(old, new, stays, PLACES, bounds)
 
 
 def unknown(columns: int) -> np.ndarray:

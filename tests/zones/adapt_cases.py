@@ -22,7 +22,7 @@ from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Layout
 from hybrid.scene.read import one_line
-from hybrid.zones.change import states_with
+from hybrid.simulation.remesh import states_with
 from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene, clamped_at, pinned_at
 

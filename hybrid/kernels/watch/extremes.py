@@ -14,10 +14,8 @@ ones are infinite, and change nothing.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, scale, sub
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
@@ -40,7 +38,7 @@ from hybrid.kernels.state.books import (
     blank_books,
 )
 from hybrid.kernels.state.report import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
-from hybrid.kernels.state.state import Floats, blank_state, in_sea, no_ends
+from hybrid.kernels.state.state import blank_state, in_sea, no_ends
 from hybrid.kernels.watch.sides import (
     BENT,
     Rods,
@@ -349,22 +347,3 @@ def carry_extremes(stays, cells, old, columns, right, to_cells, out):
             carry_column(old, columns, i, k, out)
             if right[k] != k:  # marked ones have a second column behind those of all nodes, in their order
                 carry_column(old, columns, cells + right[k] - to_cells, right[k], out)
-
-
-class Watched(NamedTuple):
-    """Nodes with their extremes: s, rods and extremes as above; right: columns of what is after the nodes."""
-
-    s: Floats
-    rods: NDArray[np.bool_]
-    right: NDArray[np.int64]
-    extremes: Floats
-
-
-@kernel
-def pass_on(old, new, stays, places, bounds):
-    """All of it, of `Watched` nodes whose arrays do not share memory; stays: (N+1,) room."""
-    s, rods, right, now = old
-    to_s, to_rods, to_right, out = new
-    match_nodes(s, rods, to_s, to_rods, stays)
-    fold_gone(s, now, right, stays, places, bounds)
-    carry_extremes(stays, rods.shape[0], now.reshape(now.size), now.shape[2], to_right, to_rods.shape[0], out)
