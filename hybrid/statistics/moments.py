@@ -165,6 +165,8 @@ def mean_of_largest_third(ranges: Floats) -> float:
 SEGMENTS = 16
 # Samples of a segment at least: fewer resolve no peak.
 LEAST_SAMPLES = 16
+# Even times to a mean step of uneven ones at most: one step that was cut to 1e-7 s would ask for 74 GB.
+MOST_FINER = 16
 
 
 class Spectrum(NamedTuple):
@@ -203,6 +205,7 @@ class Spectrum(NamedTuple):
 def welch(t: ArrayLike, x: ArrayLike, segment: float | None = None) -> Spectrum:
     """The spectrum of histories x (nt, ...) at times t (nt,) s; those that are uneven are taken linear on even times.
 
+    These are as close as the closest, but MOST_FINER to a mean step at most.
     segment: s, length of the segments (Hann window, a half of overlap, mean taken out); None: an eighth of the record,
     so that there are 15 or more.  ResultError for a segment that is longer than the record or has few samples.
     """
@@ -210,7 +213,7 @@ def welch(t: ArrayLike, x: ArrayLike, segment: float | None = None) -> Spectrum:
 
     times, values = checked(t, x, LEAST_SAMPLES)
     step = np.diff(times)
-    dt = float(step.min() if np.ptp(step) > 1e-6 * step.max() else step.mean())
+    dt = max(float(step.min()), float(step.mean()) / MOST_FINER) if np.ptp(step) > 1e-6 * step.max() else step.mean()
     count = round((times[-1] - times[0]) / dt) + 1
     even = times[0] + dt * np.arange(count)
     if np.ptp(step) > 1e-6 * step.max():

@@ -123,6 +123,14 @@ def test_spectrum_of_uneven_times_is_that_of_even_ones() -> None:
     assert moments.welch(t[keep], x[keep]).significant == pytest.approx(moments.welch(t, x).significant, rel=0.02)
 
 
+def test_one_short_step_does_not_make_the_spectrum_of_millions_of_times() -> None:
+    t, x = record(HOUR, 1)
+    more = np.insert(t, 500, t[500] - 1e-7), np.insert(x, 500, x[500])
+    found, even = moments.welch(*more), moments.welch(t, x)
+    assert found.f.size < 20 * even.f.size
+    assert found.significant == pytest.approx(even.significant, rel=0.01)
+
+
 def test_l_moments_are_those_of_the_laws() -> None:
     """Gumbel: ln 2 x scale; uniform on 0..1: 1/6; by their definition as half the mean difference of two values."""
     x = np.random.default_rng(6).gumbel(1.0, 2.0, 400_000)
