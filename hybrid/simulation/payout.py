@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
-from hybrid.kernels.laws.obstacles import stored_energy
+from hybrid.kernels.laws.axial_law import SHIFT
 from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.reel.paid_length import carry_layers, length_at
+from hybrid.kernels.reel.paid_length import length_at
 from hybrid.kernels.reel.payout import end_payout, fit_line, lengthen, put_forces_on, remove_forces
-from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, energy_of, place_reel
+from hybrid.kernels.reel.payout_nodes import energy_of, place_reel
 from hybrid.kernels.reel.reel import Reel, ReelNumbers, blank_reel, blank_reel_job, losses, tension_held
 from hybrid.kernels.state.books import Clock
 from hybrid.kernels.state.report import FRICTION, LENGTH_OUT, PAYOUT_RATE, STIFFNESS_DAMPING, TOUCHES
-from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, copied, slip_size, state_for
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, copied, slip_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, Zone, on_other_parts
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, lengths_at, payout_of
@@ -39,13 +38,13 @@ ROUND_OFF = 1e-9  # of the length: places of nodes are no nearer to what they we
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
 
 
-class Before(NamedTuple):
-    """A line in motion, as a node that enters or leaves finds it."""
+class OtherNodes(NamedTuple):
+    """A line with one node more, or less, at the fairlead."""
 
-    state: State
-    t: float  # s
-    clock: Clock
-    tension: Floats  # (2, N) N, as of Books
+    model: Model
+    reel: Reel
+    source: np.ndarray  # (N,) which old cell each of its cells comes from
+    of_base: np.ndarray  # (n,) likewise of base cells
 
 
 class PayingOut:
@@ -56,7 +55,7 @@ class PayingOut:
         self.plan: PayoutPlan = model.payout
         self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
         self.count = self.plan.count(self.plan.first)  # material nodes that are out; of base cells, where these are cut
-        self._nodes = self.plan.nodes if model.layout is None else self.plan.nodes_of(model.layout)
+        self.nodes = self.plan.nodes if model.layout is None else self.plan.nodes_of(model.layout)
         self._slips = slip_size(model.line) // 2  # layers that do
         self.reel = self._blank(model.cells - self.rides)
         # Rate, m/s, by which the rods of zones that move have been given at the winch: at the start, or by the last
@@ -66,7 +65,6 @@ class PayingOut:
         self.ended = False  # whether the end at the winch has been let go
         self.stopped = False  # whether its rate goes to zero for good
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), Clock()
-        self._carrying = Table(blank_carry_job())
 
     def _blank(self, material: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
@@ -78,7 +76,7 @@ class PayingOut:
         numbers.spring = plan.cable.springs[plan.side]
         if plan.cable.vortices.size:
             numbers.lift = plan.cable.vortices[-plan.side, 0]
-        place_reel(reel, self._nodes, material)
+        place_reel(reel, self.nodes, material)
         return reel
 
     def on(self, model: Model, length: float) -> Model:
@@ -94,19 +92,20 @@ class PayingOut:
         sea = model.sea if cells == model.cells else model.sea.on(cells)
         return replace(model, line=line, zones=zones, sea=sea, length=length, layout=layout, on_base=on_base)
 
-    def end(self, before: Before, line: Line, ends: Ends) -> float:
-        """The end at the winch is let go: what is out goes on as it moves, and no more comes; the energy, J, of that.
+    def end(self, state: State, t: float, model: Model) -> float:
+        """The end at the winch is let go at t (s): what is out goes on as it moves (state), and no more comes.
 
-        before: whose state is changed.
+        It returns the energy, J, of that.
         """
-        old = energy(line, ends, before.state)
+        line, ends, sea = model.line, model.ends.at_time(t), model.sea.values
+        old = energy(line, ends, state, sea)
         end_payout(self.table.numbers)
         self.winch.tension, self.ended = 0.0, True
         law = np.zeros((1, 8))
-        law[0, 0], law[0, 7] = before.t, self.length
+        law[0, 0], law[0, 7] = t, self.length
         self._set_law(law)
         self.leave_unbalanced()
-        return energy(line, ends, before.state) - old
+        return energy(line, ends, state, sea) - old
 
     def stop(self, t: float, over: float) -> None:
         """From t (s) on the rate goes to zero over a time (s), for good, and so does a tension that is held.
@@ -225,49 +224,33 @@ class PayingOut:
         winch = self.winch
         return self.holds_tension and not winch.least <= winch.length_now <= winch.most
 
-    def change(
-        self, run: Before, model: Model, carry: Callable[[Model, np.ndarray, np.ndarray], None] | None = None
-    ) -> tuple[Model, State, float]:
-        """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in.
-
-        carry: lets zones that move go on, with the model and which old cell (N,) each of its cells comes from, and
-        base cell (n,).
-        """
-        state, old, plan = run.state, self.reel, self.plan
-        more_nodes = 1 if self.enters else -1
-        source = self._came_from(self.enters, old.true.size)
-        of_base = source
+    def begin_change(self, model: Model, t: float) -> OtherNodes:
+        """The line with one node more, or less, at the fairlead at t (s), before it has a state."""
+        plan, more = self.plan, 1 if self.enters else -1
+        source = of_base = self._came_from(self.enters, self.reel.true.size)
+        old = model.line
         if model.layout is not None:
             of_base = self._came_from(self.enters, model.layout.rod.size)
-            parts = plan.parts_of(self.count + more_nodes)
+            parts = plan.parts_of(self.count + more)
             here = on_other_parts(model.layout, model.layout.node_flags, of_base, parts) if plan.follows else None
             model = replace(model, layout=model.layout._replace(rod=model.layout.rod[of_base], parts=parts, here=here))
-        self.count, material = self.count + more_nodes, self.material + more_nodes
-        length = self.length
-        changed = self.on(model, length)
-        if changed.layout is not None:
-            self._nodes = plan.nodes_of(changed.layout)
-        if model.line.law.size:  # laws as the last step has linearised them
-            changed.line.ck[:], changed.line.law[:, SHIFT:] = model.line.ck[source], model.line.law[source, SHIFT:]
-        reel, out = self._blank(material), state_for(changed.line)
-        self._fit(changed.line, reel, length, run.t)  # what new cells lack goes by what they are made of
-        self._carrying.bind(line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel)
-        self._carrying.bind(clock=run.clock, tension=run.tension, nodes=self._nodes)
-        carry_node(self._carrying.numbers)
-        if out.layers.size:
-            carry_layers(model.line, changed.line, state, out, old, reel)
-        if out.wake.size and more_nodes > 0:
-            self._blend_phases(model.line.s, out)
-        reel.true[material - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
-        self.reel = reel
-        self._fit(changed.line, reel, length, run.t)
-        if carry is not None:
-            carry(changed, source, of_base)
-        ends, sea = model.ends.at_time(run.t), model.sea.at_time(run.t)
-        more = energy(changed.line, ends, out, sea) - energy(model.line, ends, state, sea)
-        if model.line.law.size:
-            more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)
-        return changed, out, more
+        self.count, material = self.count + more, self.material + more
+        model = self.on(model, self.length)
+        if model.layout is not None:
+            self.nodes = plan.nodes_of(model.layout)
+        if old.law.size:  # laws as the last step has linearised them
+            model.line.ck[:], model.line.law[:, SHIFT:] = old.ck[source], old.law[source, SHIFT:]
+        reel = self._blank(material)
+        self._fit(model.line, reel, self.length, t)  # what new cells lack goes by what they are made of
+        return OtherNodes(model, reel, source, of_base)
+
+    def end_change(self, new: OtherNodes, s: Floats, state: State, out: State, t: float) -> None:
+        """The line goes on with other nodes at t (s), to which its state has been carried; s: m, nodes of before."""
+        if out.wake.size and out.wake.shape > state.wake.shape:
+            self._blend_phases(s, out)
+        new.reel.true[self.count - 1] = self.length - self.plan.layer[0] - self.plan.nodes[self.count - 1]
+        self.reel = new.reel
+        self._fit(new.model.line, new.reel, self.length, t)
 
     def _blend_phases(self, s: Floats, out: State) -> None:
         """Vortices at a node that has just entered (out: written) are between those of its neighbours.
@@ -348,7 +331,7 @@ class PayingOut:
 
     def _set_cells(self, layout: Layout) -> None:
         """Go on with other cells far from the winch: what the reel knows of those near it stays."""
-        old, self._nodes = self.reel, self.plan.nodes_of(layout)
+        old, self.nodes = self.reel, self.plan.nodes_of(layout)
         self.reel = reel = self._blank(layout.base_of_cell.size - self.rides)
         reel.numbers[:], reel.stage[:], near = old.numbers, old.stage, FEWEST_CELLS + self.plan.layer.size
         for name in OF_CELLS:
@@ -464,7 +447,7 @@ class PayingOut:
             found = matched(cells, known, "payout")
             provisional = float(self.plan.nodes[count] + self.plan.layer[0])
             layout = self.plan.layout(count, provisional, found["rod"], found.get("here"))
-            model, self._nodes = replace(model, layout=layout), self.plan.nodes_of(layout)
+            model, self.nodes = replace(model, layout=layout), self.plan.nodes_of(layout)
             self.reel = self._blank(layout.base_of_cell.size - self.rides)
         else:
             self.reel = self._blank(count)
@@ -538,8 +521,7 @@ def varying(line: Line) -> list[str]:
     return [*VARIES, *(name for name in VARIES_TOO if getattr(line, name).size)]
 
 
-def energy(line: Line, ends: Ends, state: State, sea: Sea | None = None) -> float:
-    """Kinetic, elastic and potential energy, J; sea: with what contact with it has stored."""
+def energy(line: Line, ends: Ends, state: State, sea: Sea) -> float:
+    """Kinetic, elastic and potential energy, J, with what contact with the sea has stored."""
     n = line.s.size
-    found = float(energy_of(line, ends, state, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(5)))
-    return found + float(stored_energy(line, sea, state.r)) if sea is not None and line.bits & TOUCHES else found
+    return float(energy_of(line, sea, ends, state, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(5)))

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import remesh as f
+from hybrid.kernels.reel.paid_length import carry_layers
 from hybrid.kernels.reel.payout import stand_still
 from hybrid.kernels.reel.payout_nodes import (
     OF_REEL,
@@ -29,15 +30,20 @@ from hybrid.kernels.reel.payout_nodes import (
     renew_run,
 )
 from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
+from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.report import REMEMBERS
-from hybrid.kernels.state.state import Batch, Line, Sea
+from hybrid.kernels.state.state import Batch, Line, Sea, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.line import lines_like, of_whole_line
 from hybrid.outputs.observation import Output
-from hybrid.simulation.remesh import Bound, OfRun, Part, Remesh, copy_fields, steps_alone
+from hybrid.simulation.remesh import Bound, Given, OfRun, Part, Remesh, copy_fields, steps_alone
 from hybrid.simulation.result_file import marks_on
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
+
+
+# With a model: which old cell (N,) each of its cells comes from, and base cell (n,).
+Carry = Callable[[Model, np.ndarray, np.ndarray], None]
 
 
 class NodeChanges(Remesh):
@@ -45,22 +51,22 @@ class NodeChanges(Remesh):
 
     beside, most_waiting, per_node = ("line", "sea", "old", "new", "report", "reel", "X", "W"), 512, OF_REEL
 
-    def __init__(self, run: OfRun, number: int) -> None:
-        """Room for all; `adopt` before the first change."""
+    def __init__(self, run: OfRun, number: int, once: bool = False) -> None:
+        """Room for all; `adopt` before the first change; once: for `change_once`."""
         paying, model = run.lines[number].paying, run.model.models[number]
         assert paying is not None
         self._paying = paying
         plan, reel, twice, damped = self._paying.plan, self._paying.reel, self._paying.solves_twice, self._paying.damped
         extra = int((marks_on(model.line.s, run.lines[number].marked) != 0).sum())
-        super().__init__(run, number, extra, twice)
+        super().__init__(run, number, extra, twice, once)
         reels = Packed(
             lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped), given=SHARED
         )
-        self._reels = Room(reels, self.most), Room(reels, self.most)
+        self._reels = self._sides(reels, reel)
         # for what cells lack whose outputs wait; some MB, of which a run with few outputs touches little
-        self._lacks = np.empty(self.most_waiting * OF_REEL * (self.most + 1))
+        self._lacks = np.empty(0 if once else self.most_waiting * OF_REEL * (self.most + 1))
         self._line_table = Table(blank_line_job())
-        self._whole = plan.whole_line(model.line, plan.held_as(model.cable))
+        self._whole = model.line if once else plan.whole_line(model.line, plan.held_as(model.cable))
 
     def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
@@ -79,6 +85,33 @@ class NodeChanges(Remesh):
         """A node enters or leaves now."""
         f.change_cells(self._table.numbers)
         self.sync()
+
+    def change_once(self, carry: Carry | None) -> tuple[Model, State, Books, float]:
+        """A node enters or leaves in arrays of their own: the line, its state and books, and the energy, J, of that.
+
+        carry: lets zones that move go on; the books of their line are of no use.
+        """
+        run, paying, model, state = self._run, self._paying, self.model, self.state(0, 0, 0)
+        old, new = paying.reel, paying.begin_change(model, run.t)
+        line, out = new.model.line, state_for(new.model.line)
+        self._lines, self._reels = (Given(model.line), Given(line)), (Given(old), Given(new.reel))
+        self._states[1], self._base[:] = (Given(out), Given(out)), self._line.books.base
+        model.ends.at_time(run.t)
+        model.sea.at_time(run.t)
+        job = Table(blank_node_job)
+        self._parts()
+        job.bind(**self._node_job(0, 0, model.cells, new.model.cells))
+        carry_node(job.numbers)
+        if out.layers.size:
+            carry_layers(model.line, line, state, out, old, new.reel)
+        paying.end_change(new, model.line.s, state, out, run.t)
+        if carry is not None:
+            carry(new.model, new.source, new.of_base)
+        else:
+            renew_run(job.numbers)
+        book_change(job.numbers)
+        booked = float(self._numbers[f.AFTER] - self._numbers[f.BEFORE])
+        return new.model, out, self._books(1, new.model.cells), booked
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -99,7 +132,7 @@ class NodeChanges(Remesh):
         model, to, before = self.model, 1 - k, self._books(k, n)
         lines = self.line(k, n), self.line(to, m), self.state(k, parity, n), self.state(to, 0, m)
         reels = self._reel(k, n), self._reel(to, m), self._run.loop.clock
-        carry = CarryJob(*lines, *reels, before.tension, self._paying.plan.nodes)
+        carry = CarryJob(*lines, *reels, before.tension, self._paying.nodes)
         around = model.ends.values, self._sea_on(to, m), self._work_on(to, m), self.state(to, 1, m)
         pushes = self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m)
         rest = self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale

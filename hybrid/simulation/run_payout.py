@@ -27,7 +27,7 @@ from hybrid.model.network import NetworkModel
 from hybrid.model.payout import FEWEST_CELLS
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.parts import Part
-from hybrid.simulation.payout import Before, PayingOut
+from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
@@ -318,16 +318,13 @@ class RunPayout(Part):
             states = [*run.state.lines]
         if zones is not None:
             zones.hand_over(run.t, states[k])
-        before = Before(states[k], run.t, run.loop.clock, line.books.tension)
-        model, states[k], booked = paying.change(
-            before, run.model.models[k], zones.carry if zones is not None else None
-        )
+        model, states[k], books, booked = NodeChanges(run, k, once=True).change_once(zones.carry if zones is not None else None)
         if line.contact is not None or line.shares:  # whose forces kernels.reel.paid_length does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked
         run.model = run.model.with_lines({k: model})
         run.state = NetworkState(states, run.state.bodies)
-        line.use_cells(model)
+        line.use_cells(model, books=books if zones is None else None)
 
     def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
         """Ends (line, 0 or 1) come loose: at a winch no more line comes."""
@@ -336,8 +333,7 @@ class RunPayout(Part):
             if k in self.lines and self.lines[k].plan.side == end:
                 run.lines[k].write_down()  # with the law as it is
                 model, books = run.model.models[k], run.lines[k].books
-                before = Before(run.state.lines[k], run.t, run.loop.clock, books.tension)
-                books.work[0, b.ZONES] += self.lines[k].end(before, model.line, model.ends.at_time(run.t))
+                books.work[0, b.ZONES] += self.lines[k].end(run.state.lines[k], run.t, model)
 
     def begin_leg(self) -> None:
         """The next step is no longer than the laws of the lengths allow."""

@@ -10,7 +10,6 @@ import pytest
 
 import hybrid
 from hybrid.cli.tables import zones_over_time
-from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from tests.inside import OnlyLine, calls_of
 from tests.scenes import cable_scene, clamped_at, pinned_at
@@ -155,7 +154,7 @@ def test_nodes_enter_and_leave_as_by_python(
     winch: str, model: str, rate: float, end: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given = scene(winch, model, rate, **end)
-    one_by_one = calls_of(monkeypatch, PayingOut, "change")
+    one_by_one = calls_of(monkeypatch, NodeChanges, "change_once")
     found = hybrid.run(given)
     assert not one_by_one
     monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)

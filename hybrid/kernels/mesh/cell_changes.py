@@ -358,16 +358,22 @@ read_switch = reader(blank_switch_job())
 
 
 @inner
-def energy(line, sea, ends, state, zones):
-    """All energy of a state, J; its strains into those of zones."""
-    observed = Observed(zones.moment, zones.strain[1], zones.energy)
+def energy_in(line, sea, ends, state, observed):
+    """All energy of a state, J: kinetic, elastic, potential, and what contact with the sea has stored."""
     observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, observed)
-    total = zones.energy[0] + zones.energy[1] + zones.energy[2] + zones.energy[3] + twist_energy(line, state)
+    parts = observed.energy
+    total = parts[0] + parts[1] + parts[2] + parts[3] + twist_energy(line, state)
     if line.bits & AXIAL_LAW:
         total += stretch_energy(line, state)
     for i in range(state.r.shape[0]):
         total -= dot(get3(line.force, i), get3(state.r, i))
     return total + stored_in_contact(line, sea, state.r) if line.bits & TOUCHES else total
+
+
+@inner
+def energy(line, sea, ends, state, zones):
+    """The same; strains of the state go into those of zones."""
+    return energy_in(line, sea, ends, state, Observed(zones.moment, zones.strain[1], zones.energy))
 
 
 @inner

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import has_law, strain_and_energy_at
-from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.laws.seabed import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
-from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.mesh.cell_changes import begin_anew
+from hybrid.kernels.march.energies import Observed
+from hybrid.kernels.mesh.cell_changes import begin_anew, energy_in
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, copy_cell, copy_node, move_line
 from hybrid.kernels.mesh.zone_transfer import put3
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, piece_at, place_of, prepare
@@ -32,7 +31,7 @@ from hybrid.kernels.reel.payout import chord_at, left_behind, way_at
 from hybrid.kernels.reel.payout_work import put_travels, strain_at
 from hybrid.kernels.reel.reel import ENTERS, FEWEST_STEPS, LEAVES, Reel, Winch, at_its_end
 from hybrid.kernels.state.books import Books, Clock
-from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING, TOUCHES
+from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import NO_SOIL, Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blank_state, blanks
 from hybrid.kernels.step.step_control import lead
 from hybrid.kernels.watch.extremes import fold_node
@@ -516,14 +515,9 @@ def renew_books(job, n, m, forward, cut):
 
 
 @kernel
-def energy_of(line, ends, state, moment, strain, parts):
-    """Kinetic, elastic and potential energy, J; the last three are work arrays (N+1, 3), (N+1, 3), (5,)."""
-    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, Observed(moment, strain, parts))
-    found = parts[0] + parts[1] + parts[2] + parts[3]
-    for i in range(line.h.shape[0] + 1):
-        for j in range(3):
-            found -= line.force[i, j] * state.r[i, j]
-    return found
+def energy_of(line, sea, ends, state, moment, strain, parts):
+    """All energy of a state, J; the last three are work arrays (N+1, 3), (N+1, 3), (5,)."""
+    return energy_in(line, sea, ends, state, Observed(moment, strain, parts))
 
 
 # Parts of a change, in this order; between the first two comes kernels.reel.payout_nodes.carry_node, whose table begins this one.
@@ -555,9 +549,7 @@ def book_change(table):
     job = read_node(table)
     for k in range(2):  # one call for both: it is compiled once
         line, state = (job.carry.target, job.carry.out) if k else (job.carry.line, job.carry.state)
-        found = energy_of(line, job.ends, state, job.moment, job.strain, job.energy)
-        if line.bits & TOUCHES:
-            found += stored_in_contact(line, job.sea, state.r)
+        found = energy_of(line, job.sea, job.ends, state, job.moment, job.strain, job.energy)
         job.numbers[AFTER if k else BEFORE] = found
 
 
