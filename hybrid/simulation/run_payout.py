@@ -318,7 +318,8 @@ class RunPayout(Part):
             states = [*run.state.lines]
         if zones is not None:
             zones.hand_over(run.t, states[k])
-        model, states[k], books, booked = NodeChanges(run, k, once=True).change_once(zones.carry if zones is not None else None)
+        carry = zones.carry if zones is not None else None
+        model, states[k], books, booked = NodeChanges(run, k, once=True).change_once(carry)
         if line.contact is not None or line.shares:  # whose forces kernels.reel.paid_length does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked
