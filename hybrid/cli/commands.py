@@ -400,6 +400,8 @@ def plan(
     as_json: Json = False,
 ) -> None:
     """Show what a run would compute, by which keys of the scene, and how long it takes: first steps are computed."""
+    if verbose and outputs:
+        raise UsageError("--verbose: of the plan; --outputs shows all that it has")
     with session(as_json, False) as console:
         from hybrid.cli.plan_tables import contents_tables, outputs_table, plan_facts, plan_rows
 

@@ -328,6 +328,7 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("report", ".", "--modes", "3"), "--modes: of the page of one result"),
         (("report", ".", "--line", "x"), "--line: of a result"),
         (("trade", "wire.yaml", "--levels", "--models", "rod"), "--models: --levels has"),
+        (("plan", "wire.yaml", "--outputs", "-v"), "--verbose: of the plan"),
         (("study", "wire.yaml", "--case", "0", "--sensitivity", "tension_max"), "--sensitivity: not with --case"),
         (("study", "wire.yaml", "--case", "0", "--netcdf", "x.nc"), "--netcdf: not with --case"),
     ],
