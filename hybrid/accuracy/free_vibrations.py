@@ -28,6 +28,7 @@ from hybrid.linear.loaded_line import LoadedLine, frequencies_of, loaded_lines
 from hybrid.linear.matrices import (
     ANCHOR,
     LinearNetwork,
+    damping_by_turns,
     in_inertial_axes,
     in_last,
     linear_network,
@@ -184,10 +185,10 @@ class Vibrations:
         eigen = lowest_modes(network, min(MODES * len(self.lines), MOST_MODES) + free)
         self.stable = bool(eigen.squares.min() > -HELD * np.abs(eigen.squares).max())
         kept = eigen.squares > HELD * eigen.squares.max()
-        self.w, vectors = np.sqrt(eigen.squares[kept]), eigen.vectors[:, kept]
-        whole = np.asarray(network.place @ vectors)
+        self.w, self.vectors = np.sqrt(eigen.squares[kept]), eigen.vectors[:, kept]
+        whole = np.asarray(network.place @ self.vectors)
         self.parts = [whole[a:b] for a, b in pairwise(network.at)]  # (5 (N+1), m) of each line
-        self.fall = 0.5 * np.einsum("qm,qm->m", vectors, self._damping(network) @ vectors)
+        self.fall = 0.5 * np.einsum("qm,qm->m", self.vectors, self._damping(network) @ self.vectors)
         forced = list(self._forced(network))
         self.drags = [drag for each in zip(self.lines, self.parts, forced, strict=True) for drag in _drags(*each)]
         ends = [model.ends.moves().prescribed for model in rest.models]
@@ -203,6 +204,7 @@ class Vibrations:
             blocks.append(sparse_rows(moving - still))
         found = network.place.T @ sparse.block_diag(blocks, format="csr") @ network.place
         found = found + network.whole.T @ network.touching.damping @ network.whole
+        found = found + damping_by_turns(self.rest.solver, network)
         own = in_inertial_axes(self.rest.solver, self.rest.states, DAMPING)
         return sparse.csr_array(found + in_last(network.size, own))
 
@@ -279,7 +281,7 @@ class Vibrations:
         """What a unit of each mode is in outputs of a line, (places, m) or (places, 3, m)."""
         count, line = self.w.size, x.line
         moved = np.moveaxis(part.reshape(-1, SIZE, count), 2, 0)
-        found = x.response_to(moved, np.zeros((count, 2, 3)), self.w)
+        found = x.response_to(moved, x.turned_with(self.vectors.T, np.zeros((count, 2, 3))), self.w)
         yield "position", np.moveaxis(found.position, 0, 2)
         yield "tension", found.tension.T
         if line.element.any():

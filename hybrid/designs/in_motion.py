@@ -30,6 +30,7 @@ from hybrid.designs.numbers_and_results import (
     over_time,
     parse_wanted,
     peaks,
+    scale_of,
     scene_with,
     size_of,
     smoothed,
@@ -187,7 +188,8 @@ def by_tangents(
     They are the means of those to both sides of a number, where the scene may have less of it; half of what these
     differ by is an error.
     """
-    steps = {key: step_of(key, sizes[key]) for key in numbers}
+    # as far as numbers go: far from the origin a step is rounded
+    steps = {key: number + step_of(key, sizes[key]) - number for key, number in numbers.items()}
 
     def other(key: str, d: float) -> Scene:
         return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
@@ -210,7 +212,9 @@ def by_tangents(
     up, down = slopes[::2], slopes[1::2]
     mean, size = 0.5 * (up + down), np.array([[sizes[key]] for key in numbers])
     left = np.maximum(off[::2], off[1::2])[:, None]  # by the last corrections of tangents
-    errors = left * np.maximum(np.abs(mean), WEAK * np.abs(base.values) / size) + 0.5 * np.abs(up - down)
+    scales = np.array([scale_of(asked, x.name, value) for x, value in zip(wanted, base.values.tolist(), strict=True)])
+    errors = left * np.maximum(np.abs(mean), WEAK * scales / size) + 0.5 * np.abs(up - down)
+    errors += np.spacing(np.abs(base.values)) / np.array([[h] for h in steps.values()])  # results are rounded, too
     return Slopes(base.values, mean, errors, len(numbers) * (TANGENTS,))
 
 

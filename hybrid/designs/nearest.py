@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from hybrid.designs.case_results import Equilibria, Point
-from hybrid.designs.numbers_and_results import number_of, parse_wanted, scale_of
+from hybrid.designs.numbers_and_results import PLACE, number_of, parse_wanted, scale_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.read import SceneLike, as_scene
@@ -175,7 +175,8 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
         return Rows(point, (point.values - goal) / scale, lambda: point.slopes / scale[:, None])
 
     low, high = np.where(start > 0.0, ((0.0,), (np.inf,)), ((-np.inf,), (0.0,)))  # each keeps its sign
-    reached = nearest(off, Space(tuple(by), start, low, high))
+    most = np.array([asked.length if PLACE.search(key) else np.inf for key in by])
+    reached = nearest(off, Space(tuple(by), start, low, high, most))
     numbers, results = reached.point.x, reached.point.values
     if float(np.abs(reached.values).max()) <= MET:
         found = dict(zip(targets, results.tolist(), strict=True))

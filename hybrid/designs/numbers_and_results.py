@@ -8,6 +8,7 @@ where it is.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -44,6 +45,8 @@ OF_TOUCHED = 3e-8
 # What runs, and equilibria far apart, differ by parts of: of coordinates this part of the longest line, of angles (deg)
 # at least a radian.
 PART_OF_LENGTH, RADIAN = 0.1, math.degrees(1.0)
+# Of an output what is at arc lengths; part of the length within which one is at the end.
+OF_OUTPUT, NEAR = ("points", "history"), 1e-9
 # Tables of how a scene is computed and written, and of what has names of its own.
 COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
 NAMED = ("lines", "points", "bodies", "obstacles")
@@ -129,16 +132,46 @@ def step_at_rest(scene: Scene, key: str, number: float) -> float:
 
 def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:
     """The scene with another number at a key, read and checked as a file is; SceneError: it may not be that."""
-    found, _ = read_text(scene_text(scene), overrides=[f"{key}={float(value)!r}"])
+    output = _with_table(scene, key, value).get("output")
+    moved = [f"output.{x}={json.dumps(getattr(output, x))}" for x in OF_OUTPUT] if output is not None else []
+    found, _ = read_text(scene_text(scene), overrides=[f"{key}={float(value)!r}", *moved])
     assert type(found) is type(scene)
     return found
 
 
 def with_number(scene: AnyScene, key: str, value: float) -> AnyScene:
     """The scene with another number at a key, not `allowed` as yet: tables beside it are those of the scene itself."""
+    return scene.model_copy(update=_with_table(scene, key, value))
+
+
+def _with_table(scene: Scene, key: str, value: float) -> dict[str, Any]:
+    """Tables of a scene that are others with another number at a key.
+
+    Output points and histories at the end of a line stay there, and those beyond it go there.
+    """
     first, *rest = PART.findall(key)
-    tables = scene.written if first in type(scene.written).model_fields else scene
-    return scene.model_copy(update={first: _put(getattr(tables, first), rest, float(value))})
+    tables: Any = scene.written if first in type(scene.written).model_fields else scene
+    made = _put(getattr(tables, first), rest, float(value))
+    lengths = {"": (tables.cable.length, made.length)} if first == "cable" else {}
+    if first == "lines":
+        lengths = {name: (tables.lines[name].cable.length, x.cable.length) for name, x in made.items()}
+    changed = {name for name, (old, new) in lengths.items() if old != new}
+    update = {}
+    for places in OF_OUTPUT if changed else ():
+        kept = getattr(tables.output, places)
+        if isinstance(kept, Mapping):
+            update[places] = {k: _on_line(x, *lengths[k]) if k in changed else x for k, x in kept.items()}
+        elif "" in changed:
+            update[places] = _on_line(kept, *lengths[""])
+    more = {"output": tables.output.model_copy(update=update)} if update else {}
+    return {first: made} | more
+
+
+def _on_line(places: Any, old: float, new: float) -> Any:
+    """Arc lengths, m, on a line of another length; a number of places, or none, stays."""
+    if not isinstance(places, tuple):
+        return places
+    return tuple(sorted({new if x > new or abs(x - old) <= NEAR * old else x for x in places}))
 
 
 def allowed(scene: AnyScene) -> AnyScene:

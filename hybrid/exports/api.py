@@ -320,7 +320,7 @@ def _series_at(part: Part, bends: Bends, s: float, place: str) -> list[Series]:
     series = []
     end_force = _ends(part).get(s, "")
     if end_force and f"steps/{end_force}" in result and len(part.array("steps/t")) > 2:
-        basis = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
+        basis = "magnitude of the force that holds the end (of an end body: of the line on it), at every step"
         series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), basis))
     else:
         found = [result.at(s=s, names=["tension"], side=side)["tension"][part.rows] for side in ("left", "right")]

@@ -53,7 +53,8 @@ class Eigen:
 def lowest_modes(network: LinearNetwork, count: int, near: float | None = None) -> Eigen:
     """The modes nearest to a frequency `near`, rad/s; None: the lowest.  ComputationError where there are fewer."""
     A, M = network.stiffness, network.mass
-    most = int((M.diagonal() > 0.0).sum())
+    tight = (network.tensions > 0.0) & (A.diagonal() == 0.0)  # cells that do not stretch, each of which holds a motion
+    most = int((M.diagonal() > 0.0).sum()) - int(tight.sum())
     if most < 1:
         raise ComputationError(Outcome.SINGULAR, None, None, "nothing of this network can move: it has no modes")
     count = min(count, most)

@@ -7,7 +7,7 @@ so that velocities are -i w X and accelerations -w^2 X.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -17,6 +17,7 @@ from scipy import sparse
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
+from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.laws.closed_forms import FADED
 from hybrid.kernels.laws.water import ALONG, CM, CN, CT, MIDDLE, PUSH, WATER, WET, wave_kinematics
@@ -204,24 +205,30 @@ AWRY = (0.3, 0.9, 0.4)  # along no axis
 
 def loaded_lines(rest: Rest, network: LinearNetwork, omegas: Floats) -> list[LoadedLine]:
     """All lines of a network at rest."""
-    each = zip(rest.solver.lines, network.lines, rest.models, strict=True)
-    return [LoadedLine(x, linear, model, omegas) for x, linear, model in each]
+    found, first = [], network.size - 6 * network.bodies
+    for x, linear, model in zip(rest.solver.lines, network.lines, rest.models, strict=True):
+        carriers = {k: first + 6 * (x.joints[k] - network.points) + 3 for k in (0, 1) if x.seats[k, TURNS] != 0.0}
+        found.append(LoadedLine(x, linear, model, omegas, carriers))
+    return found
 
 
 class LoadedLine:
     """One line, its drag, and what excites it."""
 
-    def __init__(self, x: JoinedLine, linear: LinearLine, model: Model, omegas: Floats) -> None:
-        self.name, self.linear, self.x, self.hinges = linear.name, linear, x, model.cable.hinges
+    def __init__(
+        self, x: JoinedLine, linear: LinearLine, model: Model, omegas: Floats, carriers: Mapping[int, int]
+    ) -> None:
+        """carriers: of ends that turn with bodies, where the turns of these begin among the numbers of the network."""
+        self.name, self.linear, self.x, self.carriers = linear.name, linear, x, carriers
         self.line, state, self.sea = linear.line, linear.state, model.sea.at_time(np.inf)
-        self.obstacles = model.sea.names
+        self.hinges, self.obstacles = model.cable.hinges, model.sea.names
         self.carried: dict[int, Floats] = {}  # (F, N+1, 3) m, motions of obstacles that bodies carry, at the nodes
         count = self.line.s.size
         calm = self.line._replace(bits=self.line.bits & ~DRAG, point_drag=0.0 * self.line.point_drag)
 
-        rows, held = np.zeros((count, SIZE * WIDTH)), x.ends.held.copy()
-        held[np.asarray(x.joints) >= 0] = 0  # the row of a held start has no forces
-        ends = x.ends._replace(held=held)
+        rows = np.zeros((count, SIZE * WIDTH))
+        # the row of a held start has no forces
+        ends = x.ends._replace(held=np.where(np.asarray(x.joints) >= 0, 0, x.ends.held).astype(x.ends.held.dtype))
         march = RestMarch(calm._replace(bits=calm.bits | WAVES), ends, state, rows)
 
         def rows_of(sea: Sea) -> Floats:
@@ -237,18 +244,22 @@ class LoadedLine:
             np.array([getattr(e, of) for e in self.excited], complex).reshape(len(omegas), rows, 3)
             for of, rows in (("forces", count), ("water", count), ("shifts", 2), ("turns", 2))
         )
+        self.frames = self.turns.copy()  # turns of frames by the motion found last
         self.rise = np.array([e.rise for e in self.excited], complex).reshape(len(omegas), count)
         self.damping = sparse_rows(moving - still)  # of the sections and of the bed
         self.node, self.d, self.cn, self.ct, self.current = half_cells(self.line, self.sea, state)
         self.axes = axes_across(self.d)
         self.point_drag = np.nan_to_num(self.line.point_drag) if self.line.bits & BODIES else np.zeros(count)
         self.q = np.zeros((len(omegas), count, SIZE), complex)
-        self.omegas, self.phases = omegas, phases_of(omegas) if omegas.size else None
-        self.blocks = np.zeros((count, 3, 3))
-        # whether free points or bodies move it that have drag of their own, or what it carries and is heavier than it
+        self.omegas, self.blocks = omegas, np.zeros((count, 3, 3))
+        self.phases = phases_of(omegas) if omegas.size else None
+
+    @cached_property
+    def by_drag(self) -> bool:
+        """Whether free points or bodies move it that have drag of their own, or what it carries and is heavier."""
         carried = np.nan_to_num(self.line.point_mass) + np.nan_to_num(self.line.point_added)
         own = float((self.line.mass - np.nan_to_num(self.line.point_mass)).sum())
-        self.by_drag = bool((carried > own)[self.point_drag > 0.0].any())
+        return bool((carried > own)[self.point_drag > 0.0].any())
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
         """Linear drag (N+1, 3, 3) N s/m of every node, by its latest motion.
@@ -267,6 +278,10 @@ class LoadedLine:
             flow = current_at(self.line, self.sea, self.linear.r[at])
             blocks[at] += self.point_drag[at][:, None, None] * linear_law(flow, relative[:, at], self.phases)
         return blocks
+
+    def kinds(self, blocks: Floats) -> tuple[Floats, ...]:
+        """Blocks of nodes of the line, and of those with a point or body, whose drag may be much more."""
+        return blocks[self.point_drag == 0.0], blocks[self.point_drag > 0.0]
 
     def relative(self, which: np.ndarray, start: bool = False) -> Floats:
         """Velocity (F, N+1, 3) m/s of the water relative to the nodes, by the motion found last; start: none."""
@@ -294,7 +309,7 @@ class LoadedLine:
         for k in (0, 1):
             turns = self.turns[which, k].T
             if turns.any() and self.line.element[-k]:
-                out = out - self.turned[k].T @ turns
+                out = out - self.turned[k].T @ turns + 1j * w * (self.turned_fast[k].T @ turns)
         return out
 
     @cached_property
@@ -303,16 +318,32 @@ class LoadedLine:
         ends = [by_turn(self.line, self.x, self.x.ends, self.linear.state, k)[0] for k in (0, 1)]
         return tuple(ends)
 
-    def set_motion(self, which: np.ndarray, q: Floats) -> None:
-        """Keep the motion (F, N+1, 5) at some frequencies, with that of the ends that are held in it."""
-        self.q[which] = q
+    @cached_property
+    def turned_fast(self) -> tuple[Floats, ...]:
+        """The same of how fast it turns, by damping."""
+        ends = [by_turn(self.line, self.x, self.x.ends, self.linear.state, k, rates=True)[0] for k in (0, 1)]
+        return tuple(ends)
+
+    def turned_with(self, vectors: Floats, turns: Floats) -> Floats:
+        """Turns (F, 2, 3) rad of its frames, of those that are given and of bodies in motions (F, q) of the network."""
+        out = turns.copy()
+        for k, at in self.carriers.items():
+            out[:, k] = vectors[:, at : at + 3]
+        return out
+
+    def set_motion(self, which: np.ndarray, q: Floats, vectors: Floats) -> None:
+        """Keep the motion (F, N+1, 5) at some frequencies, with that of the ends that are held in it.
+
+        vectors: (F, q), the same of the network.
+        """
+        self.q[which], self.frames[which] = q, self.turned_with(vectors, self.turns[which])
         for k in (0, 1):
             if self.x.joints[k] < 0 and self.x.ends.held[k]:
                 self.q[which, -k, 1:4] = self.shifts[which, k]
 
     def result(self) -> LineResponse:
         """Amplitudes of what users ask for, in the motion found last."""
-        return self.response_to(self.q, self.turns, self.omegas)
+        return self.response_to(self.q, self.frames, self.omegas)
 
     def response_to(self, q: Floats, turns: Floats, omegas: Floats) -> LineResponse:
         """Amplitudes of the quantities of a result, in a motion q (F, N+1, 5).
@@ -484,6 +515,10 @@ class LoadedMembers:
         """Linear drag (n, 3, 3) N s/m of every piece, as of hybrid.linear.loaded_line."""
         u = math.sqrt(len(self.omegas) / which.size) * self.relative(which, start)
         return of_cylinders(self.d, self.axes, (self.cn, self.ct), self.current, u, self.phases)
+
+    def kinds(self, blocks: Floats) -> tuple[Floats, ...]:
+        """As of a line."""
+        return (blocks,)
 
     def relative(self, which: np.ndarray, start: bool = False) -> Floats:
         """Velocity (F, n, 3) m/s of the water relative to the pieces, by the motion found last; start: none."""

@@ -51,7 +51,17 @@ from hybrid.kernels.laws.seabed import TURN as TURN_DEPTH
 from hybrid.kernels.laws.water import PIECE
 from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.run import newton
-from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, HELD_SLIP, MOMENT_A, PLANAR, ROTARY, SOIL, WAVES
+from hybrid.kernels.state.report import (
+    AXIAL_LAW,
+    FRICTION,
+    HELD_SLIP,
+    MOMENT_A,
+    PLANAR,
+    ROTARY,
+    SOIL,
+    STIFFNESS_DAMPING,
+    WAVES,
+)
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, no_torsion
 from hybrid.kernels.step.step import friction_axes
 from hybrid.linear.touching import Blocks, TouchingLines, TouchingParts, hats, touching_parts
@@ -380,20 +390,23 @@ def _through_zones(line: Line) -> sparse.csr_array:
     return out.matrix(size, size)
 
 
-def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tuple[Floats, Floats]:
+def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int, rates: bool = False) -> tuple[Floats, Floats]:
     """What turns of the frame of end k do: (3, 5 (N+1)) to lengths, balances and spins, (3, 3) to its own moment.
 
-    By differences, so that every law of the element counts.
+    rates: what angular velocities of it do, by damping.  By differences, so that every law of the element counts.
     """
     count = line.s.size
     forces, moments = np.zeros((3, SIZE * count)), np.zeros((3, 3))
     frame = ends.frame[k].reshape(3, 3).copy()
     for axis in range(3):
         for sign in (1.0, -1.0):
-            frames = ends.frame.copy()
-            frames[k] = (rotation(sign * FRAME_TURN * np.eye(3)[axis]) @ frame).ravel()
+            frames, spin, turn = ends.frame.copy(), np.zeros((2, 3)), sign * FRAME_TURN * np.eye(3)[axis]
+            if rates:
+                spin[k] = turn
+            else:
+                frames[k] = (rotation(turn) @ frame).ravel()
             rows = np.zeros((count, SIZE * WIDTH))
-            report = rows_at_rest(line, x, ends._replace(frame=frames), state, (0.0, ANCHOR), rows)
+            report = rows_at_rest(line, x, ends._replace(frame=frames, spin=spin), state, (0.0, ANCHOR), rows)
             right = rows.reshape(count, SIZE, WIDTH)[:, :, -1].copy()  # minus the balance, minus the spin's
             right[:, 0] *= -1.0  # where tension makes a torque, the length of a cell hangs on the turn
             forces[axis] += sign * right.ravel() / (2.0 * FRAME_TURN)
@@ -510,6 +523,22 @@ def _couplings(
         out.add(rows, columns, forces_on[rows])
         out.add(columns, rows, forces_on[rows].T)
     return out.matrix(size, size)
+
+
+def damping_by_turns(solver: NetworkSolver, network: LinearNetwork) -> sparse.csr_array:
+    """(q, q) damping of ends that turn with bodies, by the turns of these."""
+    blocks, coupling = np.zeros((network.bodies, 6, 6)), list[tuple[int, int, Floats]]()
+    for l, (x, linear) in enumerate(zip(solver.lines, network.lines, strict=True)):
+        held = np.where(np.array(x.joints) >= 0, 0, x.ends.held).astype(x.ends.held.dtype)
+        for k in (0, 1):
+            if linear.line.bits & STIFFNESS_DAMPING and x.seats[k, TURNS] != 0.0:
+                ends, b = x.ends._replace(held=held), x.joints[k] - network.points
+                forces, moments = by_turn(linear.line, x, ends, linear.state, k, rates=True)
+                coupling.append((l, b, forces))
+                blocks[b, 3:, 3:] += moments
+    first = network.size - 6 * network.bodies
+    both = _couplings(coupling, network.at, network.place, first)
+    return sparse.csr_array(both + in_last(network.size, list(blocks)))
 
 
 def in_inertial_axes(solver: NetworkSolver, states: NetworkState, of: int) -> list[Floats]:

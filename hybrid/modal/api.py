@@ -38,6 +38,7 @@ from hybrid.linear.matrices import (
     ComplexSolver,
     LinearLine,
     LinearNetwork,
+    damping_by_turns,
     in_inertial_axes,
     in_last,
     linear_network,
@@ -495,6 +496,7 @@ class _Linear:
         by_water = [stiffness_by_water(rest.solver, rest.states, b, x) for b, x in enumerate(members)]
         self.by_water = in_last(self.network.size, by_water)
         self.by_touch = self.network.whole.T @ self.network.touching.damping @ self.network.whole
+        self.by_touch = self.by_touch + damping_by_turns(rest.solver, self.network)
         dragged = bool(self.members) or any(
             x.x.joints[k] >= 0 and x.point_drag[-k] > 0.0 for x in self.lines for k in (0, 1)
         )
@@ -515,9 +517,10 @@ class _Linear:
             worst = 0.0
             for x in self.loaded:
                 new = x.drag_blocks(some, start=False)
-                size = float(np.abs(new).max(initial=0.0))
-                if size > 0.0:
-                    worst = max(worst, float(np.abs(new - x.blocks).max()) / size)
+                for change, each in zip(x.kinds(new - x.blocks), x.kinds(new), strict=True):
+                    size = float(np.abs(each).max(initial=0.0))
+                    if size > 0.0:
+                        worst = max(worst, float(np.abs(change).max()) / size)
                 x.blocks = x.blocks + RELAXED * (new - x.blocks)
             if worst < SETTLED:
                 if some.size == every.size:
@@ -547,7 +550,7 @@ class _Linear:
             self.vectors[f] = self.answer(self.omegas[f], right[:, column])
         whole = (P @ self.vectors[which].T).T
         for x, a, b in zip(self.lines, self.network.at[:-1], self.network.at[1:], strict=True):
-            x.set_motion(which, whole[:, a:b].reshape(which.size, -1, SIZE))
+            x.set_motion(which, whole[:, a:b].reshape(which.size, -1, SIZE), self.vectors[which])
         for b, members in self.members.items():
             members.q[which] = self.vectors[which, self.first + 6 * b : self.first + 6 * b + 6]
 

@@ -477,7 +477,8 @@ def left_out(
         q[:, row] = answer(nu[k], there[:, :, k].conj())
     whole = network.place @ q.reshape(network.size, numbers.size * PARTS)
     part = PARTS * float(np.mean(window**2))
-    return [_changes(x, whole[a:b], part) for x, (a, b) in zip(lines, pairwise(network.at), strict=True)]
+    vectors = q.reshape(network.size, -1).T
+    return [_changes(x, whole[a:b], vectors, part) for x, (a, b) in zip(lines, pairwise(network.at), strict=True)]
 
 
 def _step(loaded: Sequence[LoadedLine | LoadedMembers]) -> float:
@@ -545,11 +546,17 @@ def _of_cylinders(d: Floats, drag: tuple[Floats, Floats], speed: Floats) -> Floa
     return speed
 
 
-def _changes(x: LoadedLine, whole: Any, part: float) -> LineResponse:
-    """By the amplitudes (5 (N+1), K) of what is added, in parts whose windows have mean squares of this sum."""
+def _changes(x: LoadedLine, whole: Any, vectors: Any, part: float) -> LineResponse:
+    """By the amplitudes (5 (N+1), K) of what is added, in parts whose windows have mean squares of this sum.
+
+    vectors: (K, q), the same of the network.
+    """
     n, count = x.line.s.size, whole.shape[1]
     moved = np.moveaxis(whole.reshape(n, SIZE, count), 2, 0)
-    added, linear = x.response_to(moved, np.zeros((count, 2, 3)), np.zeros(count)), x.result()
+    added, linear = (
+        x.response_to(moved, x.turned_with(vectors, np.zeros((count, 2, 3), complex)), np.zeros(count)),
+        x.result(),
+    )
     own, more = linear.covariance, added.covariance
     # of the size of curvature, by where the bend points: fast bends across hide nothing of the plane of the bend
     points = own.copy()

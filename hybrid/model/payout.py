@@ -19,9 +19,9 @@ from hybrid.kernels.state.state import Floats, Line, slip_size
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Layout, LineOnBase, Zone
-from hybrid.model.sections import attached, bending_stiffness
+from hybrid.model.sections import bending_stiffness, sleeves
 from hybrid.scene.analysis import AdaptiveModel
-from hybrid.scene.attachments import BendRestrictor, BendStiffener, Spread
+from hybrid.scene.attachments import Spread
 from hybrid.scene.cable import Section
 from hybrid.scene.ends import Payout
 from hybrid.scene.motion_file import RecordRefused, check_file, read_table
@@ -314,8 +314,8 @@ def _last_fixed(scene: LineScene, zones: Sequence[Zone], side: int) -> float:
     points = [x for x in (at if side else length - at).tolist() if x < length]
     out = scene.cable.sections if side else scene.cable.sections[::-1]
     changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
-    sleeves = [x.range[1] if side else length - x.range[0] for x in attached(scene, BendStiffener, BendRestrictor)]
-    return max([joint, *points, *changes, *sleeves, _catenary_up_to(scene)])
+    edges = [b if side else length - a for a, b in sleeves(scene)]
+    return max([joint, *points, *changes, *edges, _catenary_up_to(scene)])
 
 
 def _with_cells(nodes: list[float], sections: Sequence[Section], longest: float, h: float, ride: int) -> list[float]:

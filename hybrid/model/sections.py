@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import accumulate, pairwise
+from itertools import accumulate, chain, pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -135,6 +135,11 @@ def attached(scene: LineScene, *kinds: type[Kind]) -> list[Kind]:
     return [x for x in scene.cable.attachments if isinstance(x, kinds)]
 
 
+def sleeves(scene: LineScene) -> list[tuple[float, float]]:
+    """Stretches (m) where a bend stiffener or a restrictor bends with the cable."""
+    return [x.range for x in attached(scene, BendStiffener, BendRestrictor)]
+
+
 def attached_weights(scene: LineScene) -> list[float]:
     """Weight in water of every attachment and end body, N, positive downwards."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
@@ -152,7 +157,7 @@ def section_changes(scene: LineScene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where bending stiffness jumps: between sections, at the ends of stiffeners."""
     found = [*accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1])]
     near = 1e-9 * scene.length
-    for edge in (edge for x in attached(scene, BendStiffener, BendRestrictor) for edge in x.range):
+    for edge in chain(*sleeves(scene)):
         if near < edge < scene.length - near and all(abs(edge - s) > near for s in found):
             found.append(edge)
     return tuple(sorted(found))

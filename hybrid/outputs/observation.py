@@ -379,7 +379,7 @@ class JoinedGrid(Grid):
 class JoinedObservation(Observation):
     """Outputs of several lines."""
 
-    def __init__(self, outputs: Sequence[Output], sea: Sea, grid: JoinedGrid) -> None:
+    def __init__(self, outputs: Sequence[Output], sea: Sea, grid: JoinedGrid, paid: int = 0) -> None:
         lines, batches = [x.line for x in outputs], [x.batch for x in outputs]
         along: dict[str, Any] = {
             name: _joined([getattr(x, name) for x in lines], name not in NODES_OF_LINE) for name in ALONG_LINE
@@ -390,7 +390,7 @@ class JoinedObservation(Observation):
         of |= {name: _joined([getattr(x, name)[0] for x in batches], True)[None] for name in CELLS_OF_BATCH}
         rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch")]
         heads: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}
-        super().__init__(lines[0]._replace(**along), sea, grid, Batch(**heads, **of))
+        super().__init__(lines[0]._replace(**along), sea, grid, Batch(**heads, **of), paid=paid)
         self.outputs, self.begin, self._joined_grid = outputs, grid.begin, grid
 
     @property
@@ -445,7 +445,7 @@ class JoinedObservation(Observation):
     def one(self, k: int) -> Observation:
         """Output k as if it had been looked at alone."""
         found = self.outputs[k]
-        return Observation(found.line, self.sea, self._joined_grid.of[k], found.batch)
+        return Observation(found.line, self.sea, self._joined_grid.of[k], found.batch, paid=self.paid)
 
 
 # --- obstacles ---------------------------------------------------------------------------------

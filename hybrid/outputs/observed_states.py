@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.books import LOADED, SEAM
+from hybrid.kernels.state.report import PAYOUT_RATE
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import Along, Found, observe_obstacles, observed
 from hybrid.model.mesh import Zone
@@ -302,9 +303,20 @@ class ObservedStates:
     """A batch of states on nodes and cells, as computed."""
 
     def __init__(
-        self, line: Line, sea: Sea, grid: Grid, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
+        self,
+        line: Line,
+        sea: Sea,
+        grid: Grid,
+        batch: Batch,
+        varied: Mapping[str, Floats] = MappingProxyType({}),
+        paid: int = 0,
     ) -> None:
-        """varied: arrays (nb, ...) of the line by name, where it is another one in every output."""
+        """States of a line on a grid.
+
+        varied: arrays (nb, ...) of the line by name, where it is another one in every output; paid: nodes that go along
+        with a winch at the end, negative: at the start.
+        """
+        self.paid = paid
         self.line, self.sea, self.grid, self.batch, self._varied = line, sea, grid, batch, varied
 
     def on(self, grid: Grid) -> Self:
@@ -314,6 +326,21 @@ class ObservedStates:
         for name in ("tension", "tangent", "moment", "torque", "bending_moment", "curvature_twist"):
             other.__dict__.pop(name, None)
         return other
+
+    @property
+    def velocity(self) -> Floats:
+        """(ns, 3, nb) m/s, of the material, which passes nodes that go along with a winch."""
+        found = self.grid.nodes @ self.v
+        if not self.paid:
+            return found
+        passed, lengths = np.zeros((len(self.v), self.columns)), self.of_line("h", slice(None))[:, None]
+        stretch = self.e / np.where(lengths > 0.0, lengths, 1.0)
+        starts, ends = np.asarray(self.end_nodes).reshape(2, -1)  # one, or those of each output
+        firsts = starts if self.paid < 0 else ends + 1 - self.paid
+        rates = math.copysign(1.0, self.paid) * self.batch.report[:, PAYOUT_RATE]
+        for first, rate in zip(firsts, rates.reshape(len(firsts), -1), strict=True):
+            passed[first : first + abs(self.paid)] = rate
+        return found - (self.grid.nodes @ passed)[:, None] * (self.grid.cells @ stretch)
 
     def of_line(self, name: str, at: int | slice | NDArray[np.int64]) -> Floats:
         """Values of the line at nodes or cells, (..., nb), or (..., 1) where they are the same in all outputs."""

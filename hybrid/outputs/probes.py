@@ -318,7 +318,7 @@ _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz"
 MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link", "von_mises", "capacity_used", "code_used")
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.r, frame="inertial"),
-    "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.v, frame="inertial"),
+    "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.velocity, frame="inertial"),
     "tension": Probe("N", "tension (effective tension in a fluid)", _S, lambda v: v.tension),
     "theta": Probe("rad", "angle of the tangent to the z axis", _S, lambda v: v.theta),
     "phi": Probe("rad", "azimuth of the tangent from the x axis", _S, lambda v: v.phi),
@@ -448,7 +448,8 @@ class Features(NamedTuple):
 
     loads: arc lengths of point loads, m; changes: those where one section ends and the next begins; hinges: (2 + K, 3)
     as of `Material`; kinds: of zones that there may be, None: those that there are; finest: m, all nodes that there may
-    be, where cells follow the curvature; payout: whether the line is paid out; obstacles: their names.
+    be, where cells follow the curvature; payout: nodes that go along with a winch at the end, negative: at the start;
+    obstacles: their names.
     """
 
     loads: Sequence[float] = ()
@@ -456,7 +457,7 @@ class Features(NamedTuple):
     hinges: Floats = NO_HINGES
     kinds: set[str] | None = None
     finest: Floats | None = None
-    payout: bool = False
+    payout: int = 0
     obstacles: Sequence[str] = ()
 
 
@@ -500,7 +501,7 @@ class Observer:
         self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in features.loads))
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
-        self._touched = tuple(features.obstacles)
+        self._touched, self._paid = tuple(features.obstacles), features.payout
         self._obstacles = self._touched if line.moved.size else ()
         self._with_work, self.quantities = recorded.work, recorded.quantities
         self.first_energy: float | None = None  # J, at the first output
@@ -606,7 +607,7 @@ class Observer:
         if self._right:
             other._after = JoinedGrid(self._grids([(x, at) for x, _, at in of], True))
         other.line, other.zones, other.grid = outputs[0].line, outputs[0].zones, grid
-        return other, JoinedObservation(outputs, self.sea, grid)
+        return other, JoinedObservation(outputs, self.sea, grid, self._paid)
 
     def _grids(self, of: Sequence[tuple[Output, Floats]], after: bool) -> list[Grid]:
         """Grids of outputs with lines of their own, and their points (ns,) m; after: as of `Grid`."""
@@ -632,7 +633,7 @@ class Observer:
 
     def observation(self, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})) -> Observation:
         """Outputs as computed, for `values_of`; varied: arrays (nb, ...) of the line, where it is another in each."""
-        return Observation(self.line, self.sea, self.grid, batch, varied)
+        return Observation(self.line, self.sea, self.grid, batch, varied, self._paid)
 
     def values_of(self, plain: Observation, ratios: Floats | None = None) -> dict[str, Floats]:
         """All fields of nb outputs, (nb, ...) in the units of the fields, as new arrays.

@@ -17,7 +17,7 @@ from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch import named_quantities as k
 from hybrid.model.payout import whole_scene
-from hybrid.model.sections import bending_stiffness, outer_diameter
+from hybrid.model.sections import bending_stiffness, outer_diameter, sleeves
 from hybrid.outputs.observation import Observation, Probe
 from hybrid.store.capacity import CLAUSES, E301, F201, Row, moment_of
 from hybrid.store.capacity import CODE_NAME as CODE_USED
@@ -158,6 +158,7 @@ class Codes(OfSections):
         of = zip(self.sections, self.begins.tolist(), self.ends.tolist(), strict=True)
         self._rows = [self._row(*x) for x in of]
         self._kinds = list(dict.fromkeys(x.code.kind for x in self.sections if x.code is not None))
+        self._sleeves = sleeves(scene)
 
     def _row(self, section: Section, first: float, last: float) -> Row | None:
         code, pipe = section.code, section.pipe
@@ -193,10 +194,14 @@ class Codes(OfSections):
         section = self.numbers(v.grid.points, v.grid.after)
         z, found = (v.grid.nodes @ v.r)[:, 2], np.full(v.tension.shape, np.nan)
         catenary = np.asarray(v.grid.sides @ (~v.side_is_rod[:, None]).astype(float)) > 0.0
+        s, near, sleeved = v.grid.points, self._near, np.zeros(v.tension.shape, bool)  # a sleeve bears what is its own
+        for a, b in self._sleeves:
+            sleeved |= (s >= a - near) & (s <= b + near)
         for i, row in enumerate(self._rows):
             if row is not None:
                 of_curvature = moment_of(row, v.curvature_twist[:, 0]) if row.kind == F201 else 0.0
                 M = np.where(catenary, of_curvature, v.bending_moment)
+                M = np.where(sleeved, np.minimum(M, of_curvature), M)
                 found = np.where(section == i, 100.0 * code_used(row, v.tension, M, z), found)
         return found
 

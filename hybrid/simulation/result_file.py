@@ -83,7 +83,7 @@ STEP_FIELDS = (
     Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
     Field("error", "m", "local error of position that the step makes, by the change of acceleration in it"),
     Field("end_force_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
-    Field("end_force_end", "N", "the same at the end; of an end body: tension of the last cell"),
+    Field("end_force_end", "N", "the same at the end; of an end body: the force of the line on it"),
     Field("cpu", "s", "processor time since the start of the run"),
 )
 

@@ -115,7 +115,9 @@ def observer_of(
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
     finest = model.finest_nodes if zones_move and follows_curvature(scene) and only is None else None
-    paid, obstacles = moves and model.payout is not None, () if only else model.sea.names
+    paid, obstacles = 0, () if only else model.sea.names
+    if moves and model.payout is not None:
+        paid = model.payout.layer.size * (1 if model.payout.side else -1)
     features = Features(model.attached, section_changes(scene), model.hinges, kinds, finest, paid, obstacles)
     edges = moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED)
     gauges, asked = () if only else scene.output.elevation or (), None if only else quantities_of(scene)

@@ -70,7 +70,7 @@ class RunQuantities(Part):
             mine = {name: q for name, q in self._wanted.items() if q.line == line}
             if mine:
                 found = Quantities(scene, mine)
-                found.pipes = found.capacities = None  # what goes along a line is in the result of the line
+                found.pipes = found.capacities = found.codes = None  # the result of the line has what goes along it
                 self._of_line[line] = found, found.probes()
 
     def keep_ranges(self, lines: Sequence[RunLine]) -> None:

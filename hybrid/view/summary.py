@@ -243,7 +243,7 @@ def _kind_at(result: Result, found: Worst) -> str:
 def _compressed(tension: Along, zero: float) -> tuple[float, int]:
     """Of which length, m, the line is compressed at most at an output, and at how many outputs; zero: N, is none."""
     pressed = np.asarray(tension.values) < -zero
-    weights = np.gradient(tension.s) if len(tension.s) > 1 else np.ones(1)
+    weights = 0.5 * (np.diff(tension.s, prepend=tension.s[0]) + np.diff(tension.s, append=tension.s[-1]))
     return float((pressed @ weights).max()), int(pressed.any(axis=1).sum())
 
 

@@ -23,7 +23,7 @@ from hybrid.kernels.step.line_step import TOLERANCE
 from hybrid.scene.read import as_scene
 from hybrid.scene.root import in_full
 from tests.combinations.pairs import as_network
-from tests.scenes import cable_scene, pinned_at, span
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at, span
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -432,3 +432,36 @@ def test_the_derivative_of_an_angle_of_half_a_turn():
     )
     (found,) = hybrid.sensitivity(scene, ["last phi@50"], ["ends.end.position[1]"], motion=True)
     assert found.derivative == pytest.approx(-1 / 80, rel=1e-5)
+
+
+def test_lines_that_do_not_stretch_have_derivatives_in_motion():
+    """As those that hardly do: what the corrections of the rest leave over of lengths is no acceleration."""
+    found, by = [], ["ends.start.position[0]", "cable.sections[0].mass"]
+    for more in ({}, {"axial_stiffness": 1e9}):
+        end = pinned_at(80, 0, 0, motion={"heave": {"amplitude": 0.5, "period": 8}, "ramp": 16})
+        tables = cable_scene({"length": 120, "mass": 10} | more, pinned_at(0, 0, -60), end, model="catenary", mesh=8,
+                             time=(0.5, 0.1), output=(0.1, 11))  # fmt: skip
+        slopes = hybrid.sensitivity(as_scene(tables), ["last tension@end", "last position.z@60"], by, motion=True)
+        found.append([x.derivative for x in slopes])
+    assert found[0] == pytest.approx(found[1], rel=3e-3, abs=1e-4)
+
+
+def test_derivatives_by_coordinates_do_not_go_by_the_origin():
+    def slopes(Y):
+        section = {"mass": 10, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+        surge = {"surge": {"amplitude": 0.05, "period": 8}, "heave": {"amplitude": 0.05, "period": 8}, "ramp": 16}
+        points = {
+            "east": {"position": [150, Y, -100]}, "west": {"position": [-150, Y, -100]},
+            "vessel": {"position": [60, Y, 20], "motion": surge},
+            "buoy": {"initial_guess": [0, Y, 5], "mass": 1000, "volume": 20, "drag_area": 4, "added_mass": 5000},
+        }  # fmt: skip
+        legs = {name: line_between(name, "buoy", section | {"length": 185}, mesh=12) for name in ("east", "west")}
+        lines = legs | {"hose": line_between("buoy", "vessel", section | {"length": 100}, mesh=12)}
+        fluid = {"density": 1025, "surface": 30, "current": [0.3, 0.1, 0]}
+        tables = network_scene(points, lines, fluid=fluid, time=(2, 0.1), output=(0.1, 11))
+        wanted = ["last east/tension@end", "last hose/position.y@40"]
+        return hybrid.sensitivity(as_scene(tables), wanted, ["points.vessel.position[1]"], motion=True)
+
+    here, far = slopes(0.0), slopes(6e6)
+    assert far[0].derivative == pytest.approx(here[0].derivative, rel=2e-5)
+    assert far[1].error < 1e-2 * abs(far[1].derivative)

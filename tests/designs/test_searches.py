@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 FIXED = dict(model="catenary", initial="equilibrium", mesh={"cells": 20})
 
@@ -144,3 +144,29 @@ def test_designs_do_not_hang_on_where_the_scene_lies(X, tmp_path):
         limits={"top": {"quantity": "tension", "at": "end", "largest": 500}},
     )
     assert found.numbers["x"] - X == pytest.approx(19.4486, rel=1e-4)
+
+
+@pytest.mark.parametrize("X", [0.0, 5e5])
+def test_what_is_sought_does_not_hang_on_where_the_scene_lies(X):
+    section = {"length": 250, "mass": 20, "diameter": 0.05, "axial_stiffness": 2e8}
+    tables = cable_scene(
+        section, pinned_at(X, 0, 0), pinned_at(X + 60, 0, 0), model="catenary", mesh=20, fluid={"density": 1025}
+    )
+    found = hybrid.seek(tables, {"tension@250": 60e3}, ["ends.end.position[0]"])
+    assert found.numbers["ends.end.position[0]"] - X == pytest.approx(243.9913, rel=1e-5)
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_output_points_at_the_end_of_a_line_stay_there_when_its_length_is_sought(several):
+    section = {"length": 250.0, "mass": 20, "axial_stiffness": 2e8}
+    if several:
+        points = {"a": {"position": [0, 0, 0]}, "b": {"position": [205, 0, 100]}}
+        output = {"points": {"x": [0, 125, 250]}, "history": {"x": [250]}}
+        tables = network_scene(points, {"x": line_between("a", "b", section, model="catenary", mesh=20)}, output=output)
+        key, of = "lines.x.sections[0].length", "x/tension@end"
+    else:
+        output = {"points": [0, 125, 250], "history": [250]}
+        ends = pinned_at(0, 0, 0), pinned_at(205, 0, 100)
+        tables = cable_scene(section, *ends, model="catenary", mesh=20, output=output)
+        key, of = "cable.sections[0].length", "tension@end"
+    assert hybrid.seek(tables, {of: 60e3}, [key]).results[of] == pytest.approx(60e3)

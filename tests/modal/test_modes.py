@@ -374,3 +374,13 @@ def test_the_largest_shift_of_a_mode_is_1_m_whatever_its_direction():
     for turned in (0.0, 0.7):
         found = hybrid.modes(sag(20, 100.0 * math.cos(turned), 100.0 * math.sin(turned)), count=3).modes
         assert [np.linalg.norm(x.shifts["cable"], axis=1).max() for x in found] == pytest.approx([1.0] * 3)
+
+
+@pytest.mark.parametrize("cells", [4, 10])
+def test_few_cells_that_do_not_stretch_have_modes(cells):
+    periods = []
+    for more in ({}, {"axial_stiffness": 1e9}):
+        section = {"length": 50, "mass": 5, "diameter": 0.03} | more
+        tables = cable_scene(section, pinned(0, 0, 0), pinned(30, 0, -30), model="catenary", mesh=cells)
+        periods.append([x.period for x in hybrid.modes(tables, 4).modes])
+    assert periods[0] == pytest.approx(periods[1], rel=1e-4)

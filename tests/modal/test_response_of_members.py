@@ -14,7 +14,7 @@ from hybrid.linear.loaded_line import turning_doubts
 from hybrid.linear.response_results import of_few, phases_of
 from hybrid.model.network import build_network
 from hybrid.scene.root import in_full
-from tests.scenes import cable_scene, each_line, line_between, network_scene, pinned_at
+from tests.scenes import cable_scene, clamped_at, each_line, line_between, network_scene, pinned_at
 from tests.simulation.test_vortices import G, body, floating, scene, small_body
 
 ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
@@ -261,3 +261,61 @@ def test_tension_of_a_line_with_a_heavy_float_near_its_resonance():
         here = (np.exp(-2j * np.pi * np.outer(run.times[late], line.f)) @ line.tension[:, 3:5].mean(axis=1)).real.std()
         assert 0.03 < run.tension[late][:, 4].std() / here - 1.0 < 0.08
     assert not found.valid_for("tension")
+
+
+def test_a_clamp_on_a_body_turns_with_it():
+    pipe = {"length": 57.0, "mass": 30.0, "diameter": 0.15, "axial_stiffness": 1e8, "bending_stiffness": 2e5}
+    leg = {"length": 69.0, "mass": 4, "diameter": 0.03, "axial_stiffness": 1e7, "drag": {"normal": 1.0}}
+    heave, surge = ({"amplitude": 0.05, "period": 6.0} for _ in range(2))
+    points = {
+        "well": {"position": [0, 0, -60]}, "hang": {"body": "buoy", "place": [1, 0, -2]},
+        "anchor": {"position": [-40, 0, -60], "motion": {"surge": surge, "heave": heave, "ramp": 12}},
+        "tether": {"body": "buoy", "place": [-1, 0, -2]},
+    }  # fmt: skip
+    up = {"end": {"tangent": [0, 0, 1]}}
+    lines = {
+        "pipe": line_between("well", "hang", pipe | {"drag": {"normal": 1.0}}, mesh=20, model="rod", connections=up),
+        "leg": line_between("anchor", "tether", leg, mesh=12),
+    }
+    six = [5e3, 5e3, 5e3, 3e3, 3e3, 3e3]
+    buoy = {"initial_guess": [0, 0, -2], "mass": 5000, "volume": 9, "inertia": [9000] * 3, "centre": [0, 0, -1]}
+    tables = network_scene(
+        points, lines, bodies={"buoy": buoy | {"added_mass": six, "damping": six}},
+        fluid={"density": 1025, "current": [0.2, 0, 0]}, time=(60, 0.03), output=(0.1, 20)
+    )  # fmt: skip
+    line, result = hybrid.response(tables).lines["pipe"], hybrid.run(tables)
+    there = result.lines["pipe"].curvature[result.t > 36.0].std(axis=0)[-1]
+    assert line.deviation("curvature")[-1] == pytest.approx(there, rel=0.04)  # 9.1e-5 for 2.1e-4 1/m
+
+
+@pytest.mark.parametrize("flip", [False, True])
+def test_a_clamp_that_pitches_takes_damping_with_it(flip):
+    rod = {"length": 10.0, "mass": 5.0, "diameter": 0.1, "axial_stiffness": 1e7, "bending_stiffness": 2e4}
+    rod |= {"torsional_stiffness": 1e4, "damping": {"stiffness": 0.5}}
+    pitch = {"pitch": {"amplitude": 1.0, "period": 4.0}, "ramp": 8.0}
+    clamp = clamped_at([0, 0, 0], [0, 0, 1 if flip else -1], motion=pitch)
+    ends = ("free", clamp) if flip else (clamp, "free")
+    tables = cable_scene(rod, *ends, mesh=20, fluid={"density": 1000}, time=(30, 0.02), output=(0.1, 11), model="rod")
+    line, result = hybrid.response(tables).lines["cable"], hybrid.run(tables)
+    at = -1 if flip else 0
+    there = result.curvature[result.t > 18.0].std(axis=0)[[at, 5]]
+    assert line.deviation("curvature")[[at, 10]] == pytest.approx(there, rel=0.02)  # 0.0145 for 0.0017 1/m
+
+
+def test_drag_settles_in_whatever_order_lines_stand():
+    def deviation(order):
+        section = {"mass": 10, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+        surge = {"surge": {"amplitude": 0.05, "period": 8}, "heave": {"amplitude": 0.05, "period": 8}, "ramp": 16}
+        points = {
+            "east": {"position": [150, 0, -100]}, "west": {"position": [-150, 0, -100]},
+            "vessel": {"position": [60, 0, 20], "motion": surge},
+            "buoy": {"initial_guess": [0, 0, 5], "mass": 1000, "volume": 20, "drag_area": 4, "added_mass": 5000},
+        }  # fmt: skip
+        lines = {name: line_between(name, "buoy", section | {"length": 185}, mesh=12) for name in ("east", "west")}
+        lines["hose"] = line_between("buoy", "vessel", section | {"length": 100}, mesh=12)
+        fluid = {"density": 1025, "surface": 30, "current": [0.3, 0.1, 0]}
+        tables = network_scene(points, {x: lines[x] for x in order}, fluid=fluid, time=(2, 0.1), output=(0.1, 11))
+        return hybrid.response(tables).lines["hose"].deviation("tension")
+
+    one, two = deviation(["east", "west", "hose"]), deviation(["hose", "west", "east"])
+    np.testing.assert_allclose(one, two, rtol=1e-8)  # 4e-3

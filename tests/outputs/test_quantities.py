@@ -103,7 +103,7 @@ def test_clearances_of_a_straight_line() -> None:
     assert result.beyond[0] == pytest.approx(5.0 - 0.01, abs=1e-9) and result.beyond_at[0] == 10.0
     assert result.wall[0] == pytest.approx(3.0 - 0.01, abs=1e-9) and result.wall_at[0] == 10.0
     assert result.path[0] == pytest.approx(1.0 - 0.1 - 0.01, abs=1e-9)
-    begin = 10.001 * 4 / 7  # cells are taken whole
+    begin = 10.001 * 5 / 10  # within a cell
     assert result.part[0] == pytest.approx(math.hypot(begin, 1.0) - 0.01, abs=1e-6)
 
 
@@ -411,3 +411,16 @@ def test_the_equilibrium_has_still_water() -> None:
 def test_no_elevation_without_waves() -> None:
     with pytest.raises(hybrid.SceneError, match=r"output\.elevation(.|\n)*no waves"):
         hybrid.parse_scene(LINE.format(waves="null", places=PLACES).replace(", waves: null", ""))
+
+
+def test_a_range_begins_and_ends_within_cells() -> None:
+    clear = {"kind": "clearance", "point": [14, 1, 0]}
+    asked = {"to": clear | {"range": [0, 14]}, "off": clear | {"range": [16, 100]}}
+    line = {"length": 100, "mass": 1, "diameter": 0.02, "axial_stiffness": 1e7}
+    found = [
+        hybrid.static(cable_scene(
+            line, pinned_at(0, 0, 0), pinned_at(100.5, 0, 0), model="catenary", mesh=cells, output={"quantities": asked}
+        )) for cells in (10, 100)
+    ]  # fmt: skip
+    for name in asked:
+        assert abs(found[0][name][0] - found[1][name][0]) < 2e-3  # 4.07 and 1.00 m by the nearest nodes

@@ -498,3 +498,16 @@ def test_the_length_that_is_paid_out_does_not_hang_on_the_duration():
         return hybrid.run({"cable": {"sections": [section]}, "ends": ends, "time": time, **more}).payout["length"][:9]
 
     assert lengths(8.0) == pytest.approx(lengths(12.0), abs=1e-9)
+
+
+def test_velocity_of_a_line_that_is_paid_out_is_that_of_its_material() -> None:
+    section = {"length": 40, "mass": 6, "diameter": 0.06, "axial_stiffness": 5e5, "bending_stiffness": 400}
+    weight = {"kind": "body", "mass": 200, "volume": 0.05, "drag_area": 0.3}
+    winch = {"rate": 1, "ramp": 1, "begin": 0.1, "longest": 46}
+    found = hybrid.run(cable_scene(
+        section | {"drag": {"normal": 1.2}}, weight, clamped_at([0, 0, 0], [-0.3, 0, 1], payout=winch), model="rod",
+        mesh=20, fluid={"density": 1025}, time=(4.0, 0.04),
+        output={"every": 0.08, "points": [float(x) for x in range(0, 41, 2)]}
+    ))  # fmt: skip
+    rate = (found.position[2:] - found.position[:-2]) / (found.t[2:] - found.t[:-2])[:, None, None]
+    assert np.abs(found.velocity[1:-1] - rate)[2:].max() < 0.03  # m/s, of 1.3

@@ -12,11 +12,11 @@ import pytest
 
 import hybrid
 import hybrid.simulation.run_record
-from hybrid.errors import SceneError
+from hybrid.errors import ZONE_EVENTS, SceneError
 from hybrid.simulation import run_line
 from hybrid.store.recorder import Rows
 from tests.inside import calls_of
-from tests.scenes import cable_scene, clamped_at, line_between, network_scene
+from tests.scenes import cable_scene, clamped_at, line_between, network_scene, pinned_at
 
 ROD = {
     "length": 10.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
@@ -296,3 +296,23 @@ def test_gauges_ask_for_waves() -> None:
     still = {"fluid": {"density": 1025, "surface": 30.0}}
     with pytest.raises(SceneError, match="the sea has no waves"):
         asked({"elevation": [[0, 0]]}, environment=still)
+
+
+def test_outputs_within_steps_have_the_stiffness_of_their_time() -> None:
+    """Where bending comes, moments between the ends of a step lie between those at its ends."""
+    section = {"length": 50, "mass": 9, "diameter": 0.06, "axial_stiffness": 2e6, "bending_stiffness": 300}
+    section |= {"drag": {"normal": 1.2}, "added_mass": {"normal": 1}}
+    clump = {"kind": "clump", "at": 22, "mass": 60, "volume": 0.01, "drag_area": 0.05, "added_mass": 10}
+    buoy = {"kind": "float", "at": 38, "buoyancy": 200, "mass": 20, "drag_area": 0.1, "added_mass": 15}
+    surge = {"amplitude": 0.15, "period": 4, "phase": 60}
+    end = pinned_at(41, 0, 0, motion={"heave": {"amplitude": 0.2, "period": 4}, "surge": surge, "ramp": 4})
+    ends, inside = (hybrid.run(cable_scene(
+        section, pinned_at(0, 0, -20), end, attachments=[clump, buoy], model={"kind": "adaptive", "always_move": True},
+        mesh=50, fluid={"density": 1025}, seabed={"z": -20, "stiffness": 2e4, "damping": 500}, time=(2.6, 0.02),
+        output={"every": every, "points": [float(x) for x in range(51)]}
+    )) for every in (0.02, 0.004))  # fmt: skip
+    changes = [x.t for x in ends.events if x.kind in ZONE_EVENTS]
+    assert changes
+    linear = np.stack([np.interp(inside.t, ends.t, x) for x in ends.bending_moment.T], axis=1)
+    away = np.abs(inside.t[:, None] - np.array(changes)).min(axis=1) > 0.041
+    assert np.abs(inside.bending_moment - linear)[away].max() < 0.003 * ends.bending_moment.max()

@@ -420,3 +420,18 @@ def test_a_mooring_line_uses_at_a_clump_what_the_tension_of_all_steps_is_on_eith
     found = hybrid.run(scene)
     s, _, most = found.mooring(1.0, (1.0, 1.0), 0.0)
     assert most[s == 25.0] == pytest.approx(found["envelope/tension_max"][found["envelope/s"] == 25.0], rel=1e-12)
+
+
+def test_a_pipe_in_a_sleeve_is_checked_by_its_own_moment():
+    pipe = {"length": 20, "mass": 60, "diameter": 0.2, "axial_stiffness": 1e9, "bending_stiffness": 6e6}
+    pipe |= {"torsional_stiffness": 4.6e6, "pipe": {"wall": 0.01}, "code": CODE}
+    sleeve = {"kind": "bend_stiffener", "range": [0, 4], "added_stiffness": [[0, 5.4e7], [4, 5.4e7]]}
+    clamp, pulled = clamped_at([0, 0, -10], [0, 0, -1]), {"kind": "free", "force": [4e3, 0, 0]}
+    bare, inside = (
+        hybrid.static(cable_scene(
+            pipe, clamp, pulled, attachments=x, model="rod", mesh=80, fluid={"density": 1025, "surface": 0}
+        )) for x in (None, [sleeve])
+    )  # fmt: skip
+    at = int(np.abs(inside.s - 1.0).argmin())
+    assert inside.curvature[0, at] < 0.11 * bare.curvature[0, at]
+    assert inside.code_used[0, at] < 0.11 * bare.code_used[0, at]

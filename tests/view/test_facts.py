@@ -394,3 +394,10 @@ def test_limits_are_in_the_closing_lines_and_the_report(tmp_path: Path) -> None:
     said = "not verified: the error of tension is not estimated"
     assert said in dict(extremes_rows(extremes_facts(free), moves=True))["largest tension"]
     assert f"Allowed are 5 kN, {said}" in fact(free, "tension").text
+
+
+def test_no_more_of_a_line_is_compressed_than_there_is() -> None:
+    section = {"length": 10, "mass": 50, "bending_stiffness": 1e6, "axial_stiffness": 1e8, "torsional_stiffness": 1e6}
+    pressed = {"kind": "free", "force": [0, 0, -2000]}
+    result = hybrid.static(cable_scene(section, clamped_at([0, 0, 0], [0, 0, 1]), pressed, output={"points": 5}))
+    assert fact(result, "slack").values["length"] == pytest.approx(10.0)

@@ -21,6 +21,8 @@ from hybrid.kernels.algebra.plane import solve_again_planar
 from hybrid.kernels.algebra.rotations import (
     add,
     cross,
+    dot,
+    get3,
     inverse_left_jacobian,
     jacobian_functions,
     mat_mat,
@@ -52,10 +54,11 @@ from hybrid.kernels.junctions.bodies import (
 )
 from hybrid.kernels.junctions.borders import END, NONE, answer_right_sides, hand_on, read_network, task_of
 from hybrid.kernels.junctions.borders import START as BEGIN
+from hybrid.kernels.laws.element import chord
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.march.march import left_over_in_space
+from hybrid.kernels.march.march import AT_REST, left_over_in_space
 from hybrid.kernels.run.network_run import load_bodies
 from hybrid.kernels.state.books import HEAD, SAMPLE_POSITION, Clock, Counts
 from hybrid.kernels.state.report import NET_A, WAVES
@@ -273,6 +276,13 @@ def own_right_sides(network, net, p):
 
 
 @inner
+def faster_apart(state, c):
+    """Acceleration, m/s2, by which the nodes of cell c go apart."""
+    d, _, _ = chord(get3(state.e, c))
+    return dot(d, sub(get3(state.vd, c + 1), get3(state.vd, c)))
+
+
+@inner
 def leave_over_at_rest(job, other, cv, ca):
     """What `leave_over` does, of a state as it is, at which no step ends."""
     work, b, there = other.work, other.left, other.even
@@ -282,6 +292,9 @@ def leave_over_at_rest(job, other, cv, ca):
         wave_kinematics(other.sea, there.r, work.u)
     left_over_in_space(other.line, other.sea, other.ends, there.r, there, cv, ca, work, b)
     leave_apart(job, other, job.even, there)
+    for c in range(other.line.h.shape[0] if ca > AT_REST else 0):  # accelerations are sought of places that are known:
+        if not other.line.ck[c] > 0.0:  # rounding of the length of what does not stretch would be one
+            b[c + 1, 0] = (faster_apart(job.even, c) - faster_apart(there, c)) / (other.h * ca)
 
 
 @inner

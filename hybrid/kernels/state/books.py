@@ -152,7 +152,8 @@ LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
 TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE = range(5)
 DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES, OBSTACLE_PRESSURE = range(5, 10)
 EXTREMES = 10
-STRAINS = 8  # columns of `strains`
+STRAINS = 10  # columns of `strains`
+BENDS, BENT_BY = 8, 9  # of these: bending stiffness of elements now and before the last step, N m; 0: not known
 
 
 class Books(NamedTuple):

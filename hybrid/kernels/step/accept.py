@@ -33,7 +33,9 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.march import carry_director
 from hybrid.kernels.march.zone_torque import POWER
 from hybrid.kernels.state.books import (
+    BENDS,
     BENT,
+    BENT_BY,
     COLLAPSES,
     HEAD,
     ITERATIONS_CUT,
@@ -187,14 +189,18 @@ def sample_cells(line, old, new, x, dt, k, tension, row):
 
 
 @inner
-def sample_line(line, row):
-    """Lengths of cells and stiffness of elements as they are at the end of the step."""
+def sample_line(line, x, strains, row):
+    """Lengths of cells as they are at the end of the step, and stiffness of elements, whose bending changes evenly."""
     n = line.h.shape[0]
     at = HEAD + 9 * (n + 1) + 8 * n
     for c in range(n):
         row[at + c] = line.h[c]
     for i in range(n + 1):
-        put3(row, at + n, i, get3(line.kb, i))
+        a, b, c = get3(line.kb, i)
+        if x < 1.0 and strains.shape[0] > 0 and strains[i, BENT_BY] > 0.0 and a > 0.0:
+            part = x + (1.0 - x) * strains[i, BENT_BY] / a
+            a, b = part * a, part * b
+        put3(row, at + n, i, (a, b, c))
 
 
 @inner
@@ -319,7 +325,7 @@ def sample_state(line, sea, old, new, books, where, row):
         sample_end_twist(line, old, new, books.imposed, x, k, books.twist, row)
     at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
     if books.counts.varies:
-        sample_line(line, row)
+        sample_line(line, x, books.strains, row)
         at += line.h.shape[0] + line.kb.size
     for z in range(new.turn.shape[0]):
         for j in range(3):
@@ -435,6 +441,8 @@ def keep_past(line, ends, old, books, report):
         books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
     for i in range(books.touch.shape[1]):
         books.touch[1, i], books.touch[0, i] = books.touch[0, i], books.touch[2, i]
+    for i in range(books.strains.shape[0]):
+        books.strains[i, BENT_BY] = books.strains[i, BENDS]
     for k in range(2):
         for j in range(21):
             books.imposed[1, k, j] = books.imposed[0, k, j]

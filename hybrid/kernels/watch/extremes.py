@@ -26,6 +26,7 @@ from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel, linked_kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.state.books import (
+    BENDS,
     CURVATURE,
     DISPLACEMENT,
     MOMENT,
@@ -208,6 +209,7 @@ def note_extremes(line, sea, ends, state, books, t):
     for i in range(line.h.shape[0] + 1):
         passed, zone = passed_torque(line, state.turn, i, zone)
         note_sides(line, ends, state, books, i, passed, t)
+        books.strains[i, BENDS] = line.kb[i, 0]
         if books.touch.shape[1] > 0:
             widen_both(books.extremes, books.right, SELF_PRESSURE, i, books.touch[0, i], t)
         if line.bits & OBSTACLES:

@@ -254,13 +254,13 @@ def nearest_on(a, u, path, begin, end):
 
 
 @inner
-def node_near(s, x):
-    """The node nearest to an arc length."""
-    best = 0
-    for i in range(1, s.shape[0]):
-        if abs(s[i] - x) < abs(s[best] - x):
-            best = i
-    return best
+def part_of_cell(s, asked, c):
+    """Where the part of a cell that counts begins and ends, as parts of the cell."""
+    if math.isnan(asked[FIRST]):  # all of it
+        return 0.0, 1.0
+    h = s[c + 1] - s[c]
+    begin = min(max((asked[FIRST] - s[c]) / h, 0.0), 1.0)
+    return begin, max(min(max((asked[LAST] - s[c]) / h, 0.0), 1.0), begin)
 
 
 @inner
@@ -279,10 +279,11 @@ def over_plane(seen, asked, first, last):
     least, where = math.inf, math.nan
     here = dot(n, sub(get3(r, first), b))
     for c in range(first, last):
-        there = dot(n, sub(get3(r, c + 1), b))
-        height = min(here, there) - radius_at(seen.radii, 0.5 * (s[c] + s[c + 1]))
+        there, (x, y) = dot(n, sub(get3(r, c + 1), b)), part_of_cell(s, asked, c)
+        low, high = here + x * (there - here), here + y * (there - here)
+        height = min(low, high) - radius_at(seen.radii, 0.5 * (s[c] + s[c + 1]))
         if height < least:
-            least, where = height, s[c + 1] if there < here else s[c]
+            least, where = height, s[c] + (y if high < low else x) * (s[c + 1] - s[c])
         here = there
     return least, where
 
@@ -304,12 +305,14 @@ def from_path(seen, asked, reached, first, last):
     least, where, ahead = math.inf, math.nan, -math.inf
     for k in range(first - 1, last):  # the cell that was nearest last comes first
         c = nearest if k < first else k
-        u = get3(seen.e, c)
+        u, (low, high) = get3(seen.e, c), part_of_cell(s, asked, c)
         if k >= first:
             ahead -= math.sqrt(dot(u, u))
             if ahead > least + widest:
                 continue
-        distance, x, there = nearest_on(get3(seen.r, c), u, path, begin, end)
+        a = add(get3(seen.r, c), scale(low, u))
+        distance, x, there = nearest_on(a, scale(high - low, u), path, begin, end)
+        x = low + x * (high - low)
         found = distance - radius_at(radii, 0.5 * (s[c] + s[c + 1]))
         if k >= first:
             ahead = distance
@@ -323,12 +326,13 @@ def from_path(seen, asked, reached, first, last):
 
 @inner
 def nodes_of(s, asked):
-    """First and last node of the part of a line that counts."""
+    """First and last node of the cells of which a part counts."""
     first, last = 0, s.shape[0] - 1
     if asked[FIRST] == asked[FIRST]:
-        first, last = node_near(s, asked[FIRST]), node_near(s, asked[LAST])
-        first = min(first, s.shape[0] - 2)
-        last = max(last, first + 1)
+        while first < last - 1 and s[first + 1] <= asked[FIRST]:
+            first += 1
+        while last > first + 1 and s[last - 1] >= asked[LAST]:
+            last -= 1
     return first, last
 
 
@@ -341,11 +345,12 @@ def put_chords(seen, asked):
     if last - first > int(asked[PATH_END]) - begin - 1:
         path[begin, 0], last = -1.0, first
     for c in range(first, last):
-        row, r, u = path[begin + 1 + c - first], get3(seen.r, c), get3(seen.e, c)
+        row, (low, high) = path[begin + 1 + c - first], part_of_cell(s, asked, c)
+        r, u = add(get3(seen.r, c), scale(low, get3(seen.e, c))), scale(high - low, get3(seen.e, c))
         for k in range(3):
             row[k], row[CHORD + k] = r[k], u[k]
         row[SQUARE], row[RADIUS] = dot(u, u), radius_at(seen.radii, 0.5 * (s[c] + s[c + 1]))
-        row[BEGINS], row[SPANS] = s[c], s[c + 1] - s[c]
+        row[BEGINS], row[SPANS] = s[c] + low * (s[c + 1] - s[c]), (high - low) * (s[c + 1] - s[c])
 
 
 @inner
