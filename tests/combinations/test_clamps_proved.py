@@ -13,9 +13,9 @@ import hybrid
 from hybrid.kernels.laws.bending_law import EACH, beside_spring, slip_answer
 from hybrid.model.build import build
 from hybrid.scene.read import as_scene, one_line
-from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables
+from tests.combinations.pairs import ADAPTIVE, BASE, CLAMP, END, FAR, START, ZONES, S, Tables, exchanged
 from tests.problems import tables_with
-from tests.scenes import cable_scene
+from tests.scenes import cable_scene, clamped_at, pinned_at
 
 SPRING = 30.0  # N m/rad, 1.9 of half a cell
 LAYERS = [{"stiffness": 12.0, "moment": 0.4}, {"stiffness": 5.0, "moment": 0.9}]
@@ -247,3 +247,19 @@ def test_a_swivel_at_a_clamp_that_holds_a_direction_says_so(stiffness: Any) -> N
     })  # fmt: skip
     told = [e.text for e in hybrid.run(tables).events if e.kind == "ignored"]
     assert any("free turning at the swivel of ends.start" in x for x in told) == isinstance(stiffness, list)
+
+
+def test_layers_turn_with_the_line_at_either_end() -> None:
+    section = {
+        "length": 8.0, "mass": 2.0, "diameter": 0.04, "axial_stiffness": 1e5, "bending_stiffness": 0.9,
+        "torsional_stiffness": 1.0, "bending_slip": [{"stiffness": 1.0, "moment": 0.1}],
+    }  # fmt: skip
+    turns = {"yaw": {"amplitude": 2, "period": 0.9}, "heave": {"amplitude": 0.02, "period": 1.3}, "ramp": 0.5}
+    scene: Tables = cable_scene(
+        section, clamped_at([0, 0, 0], [1, 0, -0.5], normal=[0.1, 1, 0.2], swivel=True, motion=turns),
+        pinned_at(6, 1.2, 0.7), contact={"self": False}, model="rod", mesh=10, time=(1.0, 1 / 32), output=(1 / 8, 11),
+        dimension=3,
+    )  # fmt: skip
+    one, two = hybrid.run(scene), hybrid.run(exchanged(scene))
+    assert np.abs(one.position - two.position[:, ::-1]).max() < 1e-9
+    assert np.abs(one["moment_start"] - two["moment_end"]).max() < 1e-8

@@ -138,13 +138,14 @@ def drifting(s: Floats) -> Floats:
 
 
 def transfer_to(
-    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, shifts: bool = True
-) -> Transfer:
-    """What carries a state from one layout to another of the same base, without clamps; shifts: as of `Transfer`."""
+    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, shifts: bool = True,
+    held: bool = False,
+) -> Transfer:  # fmt: skip
+    """What carries a state from one layout to another of the same base; shifts: as of `Transfer`; held: both ends."""
     out = states_with(*memory_of(target))(target.h.size, turn=np.zeros((len(target.torsion), 3)))
-    free = np.zeros((2, 2, 3)), np.zeros(2, bool), np.array([shifts])
+    ends = np.zeros((2, 2, 3)), np.array([held, held]), np.array([shifts])
     match = blank_match(line.h.size, target.h.size)
-    return Transfer(line, target, state, out, old.places, new.places, old.first, kinks, *free, match)
+    return Transfer(line, target, state, out, old.places, new.places, old.first, kinks, *ends, match)
 
 
 class Remapped(NamedTuple):
@@ -155,14 +156,14 @@ class Remapped(NamedTuple):
 
 
 def carried(
-    what: Material, old: Layout, rod: Sequence[bool] | str, state: State, line: Line | None = None
+    what: Material, old: Layout, rod: Sequence[bool] | str, state: State, line: Line | None = None, held: bool = False
 ) -> tuple[Layout, Line, Remapped]:
-    """A state on other zones of the same base."""
+    """A state on other zones of the same base; held: both ends hold the twist of rods there."""
     new = layout(old.base, old.parts.tolist(), rod)
     target = on(what, new)
     kinks = np.zeros(old.rod.size + 1, bool)
     kinks[np.searchsorted(old.base, what.at - 1e-9 * old.base[-1])] = True
-    job = transfer_to(old, new, line or on(what, old), target, state, kinks)
+    job = transfer_to(old, new, line or on(what, old), target, state, kinks, held=held)
     transfer(Table(job).numbers)
     return new, target, Remapped(job.out, job.match.lengths)
 

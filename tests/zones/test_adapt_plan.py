@@ -14,7 +14,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA
-from hybrid.kernels.mesh.zone_plan import OFF, widen
+from hybrid.kernels.mesh.zone_plan import OFF, reach, widen
 from hybrid.model.mesh import edges
 from hybrid.zones.manager import spread, wanted
 
@@ -359,3 +359,12 @@ def test_a_line_on_a_layout(zones):
     assert (line.kb[line.element == 0] == 0).all()
     bend = line.kb[line.element == 1, 0] * line.hn[line.element == 1]
     assert np.abs(bend / 2.0 - 1).max(initial=0.0) <= 1e-13
+
+
+def test_rods_reach_as_far_from_either_end() -> None:
+    EI = np.array([9.0, 9.0, 9.0, 2.0, 2.0, 2.0])  # of nodes; the larger one where sections meet
+    w, floor, T, cells = np.full(6, 30.0), np.full(6, 1e-3), np.linspace(100.0, 140.0, 5), np.arange(5)
+    there, back = np.zeros(5), np.zeros(5)
+    reach(T, cells, EI, w, floor, 2.0, 0.1, there)
+    reach(T[::-1].copy(), cells, EI[::-1].copy(), w, floor, 2.0, 0.1, back)
+    assert np.array_equal(there, back[::-1])

@@ -267,3 +267,23 @@ def test_zones_of_lines_with_laws_change_in_place_as_with_a_new_solver(
     assert calls
     for name in ("position", "tension", "work/zones", "energy/stretch", "curvature"):
         np.testing.assert_array_equal(found[0][name], found[1][name], err_msg=name)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 2.0])
+def test_rods_that_meet_are_not_twisted(turn: float) -> None:
+    """However the scene lies: the first directors of both were made by axes of the inertial frame."""
+    c, s = np.cos(turn), np.sin(turn)
+    Q = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    end, way = (Q @ [6.62, 1.34, 1.52]).tolist(), (Q @ [0.0287, -0.0261, -0.0269]).tolist()
+    section = {
+        "length": 11.557484, "mass": 1.4623, "diameter": 0.03614, "bending_stiffness": 2.708, "damping": {"mass": 0.369},
+        "tension_strain": [[0, 0], [0.002, 233.0], [0.01, 2330.0], [0.1, 46605.0]],
+    }  # fmt: skip
+    scene = cable_scene(
+        section, pinned_at(0, 0, 0), pinned_at(*end, motion={"travel": {"by": way, "over": 0.102}}),
+        attachments=[{"kind": "clump", "at": 5.0564, "mass": 2.641}], contact={"self": False},
+        model={"kind": "adaptive", "hold_time": 0.1}, mesh=16, time=(0.1875, 1 / 128, 0.8), output=(1 / 64, 11), dimension=3,
+    )  # fmt: skip
+    found = hybrid.run(scene)
+    assert {"split", "grow"} <= {x.kind for x in found.events}
+    assert np.abs(found["torque"]).max() < 1e-6 * np.abs(found["bending_moment"]).max()

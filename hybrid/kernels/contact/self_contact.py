@@ -335,7 +335,7 @@ def energy_of_line(line, ends, state):
             after = get9(ends.frame, 1)
         if line.element[i]:
             kb, k0 = get3(line.kb, i), get3(line.k0, i)
-            x = sub(strain_of_element(before, after, kb, k0), k0)
+            x = sub(strain_of_element(before, after, kb, k0, i), k0)
             share = energy_share(line, i, math.sqrt(x[0] * x[0] + x[1] * x[1]))
             bent += 0.5 * share * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
             bent += stored_by_slip(line, i, x[0], x[1])

@@ -65,7 +65,6 @@ from hybrid.kernels.laws.element import (
     frames_at,
     relative_rotation,
     strain_of_element,
-    swing,
     swivel,
     turns_freely,
 )
@@ -225,12 +224,19 @@ def slip_moment(line, i, Ra, Rb, k0):
 
 @kernel
 def across_swivel(line, i, Ra, Rb):
-    """The same of an element that turns freely: its bend is without the twist, and its layers turn with the cell before."""
-    x = vec_mat(swing(Ra, Rb), Ra)
+    """The same of an element that turns freely: its bend is without the twist.
+
+    Its layers turn with the cell before; at a clamped start, where that is none of the line, with the first one.
+    """
+    w, turn = swivel(Ra, Rb, 1.0)
+    R = Rb if i == 0 else Ra
+    x = vec_mat(w, R)
     mx, my, c11, c12, c22, _ = element_answer(line, i, x[0], x[1])
-    _, turn = swivel(Ra, Rb, 1.0)
-    C = mat_matT(mat_mat(Ra, (c11, c12, 0.0, c12, c22, 0.0, 0.0, 0.0, 0.0)), Ra)
-    return mat_vec(Ra, (mx, my, 0.0)), mat_mat(C, turn)
+    M = mat_vec(R, (mx, my, 0.0))
+    C = mat_matT(mat_mat(R, (c11, c12, 0.0, c12, c22, 0.0, 0.0, 0.0, 0.0)), R)
+    if i == 0:
+        return M, msub(mat_mat(C, madd(turn, hat(w))), hat(M))
+    return M, mat_mat(C, turn)
 
 
 @inner
@@ -301,7 +307,7 @@ def update_slip(line, ends, old, new, work, part):
         give = give_of_spring(line, i)
         if after and layered(line, i, 0) and line.element[i]:
             Ra, Rb = frames_at(line, ends, new, i)
-            k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+            k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i), i)
             x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
             if give > 0.0:
                 whole, hn = (x, y), 0.5 * line.h[min(i, line.h.shape[0] - 1)]

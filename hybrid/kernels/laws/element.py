@@ -236,10 +236,10 @@ def swing(Ra, Rb):
 
 
 @inner
-def strain_of_element(Ra, Rb, kb, k0):
-    """Log strain (rad, frame Ra); of a swivel that of its bend alone."""
+def strain_of_element(Ra, Rb, kb, k0, i):
+    """Log strain (rad, frame Ra) at node i; of a swivel that of its bend alone, at a start in the frame of the line."""
     if turns_freely(kb, k0):
-        return vec_mat(swing(Ra, Rb), Ra)
+        return vec_mat(swing(Ra, Rb), Rb if i == 0 else Ra)
     return log_rotation(relative_rotation(Ra, Rb))
 
 

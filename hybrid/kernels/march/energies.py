@@ -124,7 +124,7 @@ def observe(line, ends, e, v, a1, w, T, turn, observed):
             d1, _ = turning(d, il, sub(get3(v, i + 1), vi), 0.0)
             wb = add(cross(d, d1), scale(w[i], d))
         kb, k0 = get3(line.kb, i), rest_strain(line, T, i)
-        k = strain_of_element(Ra, Rb, kb, get3(line.k0, i))
+        k = strain_of_element(Ra, Rb, kb, get3(line.k0, i), i)
         x = sub(k, k0)
         share = energy_share(line, i, math.sqrt(x[0] * x[0] + x[1] * x[1]))
         energy[1] += 0.5 * share * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])

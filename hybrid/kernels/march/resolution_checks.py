@@ -101,7 +101,7 @@ def sharpest_in_space(line, ends, e, T, a1, strains):
             if T[c] > 0.0 and l * l * T[c] > stiffness:
                 weight = CLAMP * l * math.sqrt(T[c] / stiffness)
             weight *= 0.5 * line.h[c] / line.hn[i]  # of a clamp with an angular spring the part of the cell
-        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i), i)
         x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
         y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0
         if strains.shape[0] > 0:

@@ -422,8 +422,42 @@ def beside(job, c, k):
 
 
 @inner
+def is_round(kb, k0):
+    """Whether an element bends alike in all directions, from straight."""
+    return kb[0] == kb[1] and k0[0] == 0.0 and k0[1] == 0.0
+
+
+@inner
+def spin_loose(job, c, k, angle):
+    """Spin the rod that begins at cell c, towards the end k, as a whole, if that changes nothing; whether it does.
+
+    It changes nothing of a round and straight one that turns freely: from joint, swivel or free end on, where no torque
+    passes through catenaries.
+    """
+    target, step, m = job.target, 2 * k - 1, job.target.h.shape[0]
+    last = c
+    while 0 <= last < m and target.spin[last] and not (last != c and is_swivel(target, last + 1 - k)):
+        i = last + k
+        if target.element[i] and not is_round(get3(target.kb, i), get3(target.k0, i)):
+            return False
+        last += step
+    if last < 0 or last >= m:
+        if job.held[k]:
+            return False
+    elif not target.spin[last] and job.held[0] and job.held[1]:
+        return False
+    while c != last and not (k and is_fresh(job, c)):  # fresh ones ahead have no frames yet
+        put3(job.out.a1, c, spin_about(get3(job.out.a1, c), direction(job.out, c), angle))
+        c += step
+    return True
+
+
+@inner
 def make_frames(job, p, q):
-    """First directors of the fresh rod cells p to q (excluded): carried on from those beside it, and from clamps."""
+    """First directors of the fresh rod cells p to q (excluded): carried on from those beside it, and from clamps.
+
+    Two rods that meet are without twist between them where one of them turns freely.
+    """
     out = job.out
     a, t, left = beside(job, p, 0)
     b, u, right = beside(job, q - 1, 1)
@@ -442,9 +476,15 @@ def make_frames(job, p, q):
         d = direction(out, c)
         a, t = carried(a, t, d), d
         put3(out.a1, c, a)
-    if left and right:  # what is left of the twist is spread
+    if left and right:  # what is left of the twist is spread, unless nothing holds it
         closing = carried(a, t, u)
         angle = math.atan2(dot(cross(closing, b), u), dot(closing, b))
+        if right == CARRIED and spin_loose(job, q, 1, -angle):
+            return
+        if left == CARRIED and spin_loose(job, p - 1, 0, angle):
+            for c in range(p, q):
+                put3(out.a1, c, spin_about(get3(out.a1, c), direction(out, c), angle))
+            return
         for c in range(p, q):
             part = angle * (c - p + 1) / (q - p + 1)
             put3(out.a1, c, spin_about(get3(out.a1, c), direction(out, c), part))

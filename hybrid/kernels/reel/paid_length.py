@@ -416,7 +416,7 @@ def begins_at(line, reel, k):
 def bend_of(line, ends, state, i):
     """Bend, rad, of the element at node i of the line, in two components; beside an angular spring of the half cell."""
     Ra, Rb = frames_at(line, ends, state, i)
-    k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+    k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i), i)
     x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
     return beside_spring(line, i, x, y) if give_of_spring(line, i) > 0.0 else (x, y)
 

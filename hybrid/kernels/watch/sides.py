@@ -290,7 +290,7 @@ def beyond_spring(t, d, line, ends, state, i):
     x, y = angle, 0.0
     if slips(line, i) and give_of_spring(line, i) > 0.0:
         Ra, Rb = frames_at(line, ends, state, i)
-        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i), i)
         x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
     part = parts_without_spring(line, i, x, y)[0]
     if part > RIGID or angle < 1e-6:
@@ -349,7 +349,7 @@ def element_strain(line, ends, state, i):
     if not line.element[i]:
         return (0.0, 0.0, 0.0)
     Ra, Rb = frames_at(line, ends, state, i)
-    return strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+    return strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i), i)
 
 
 @inner
