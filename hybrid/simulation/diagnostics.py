@@ -97,10 +97,11 @@ SNAP = 3.0
 # A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.
 TURNED = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
+NEVER = 1e300  # s, when nothing was noted
 # What a checkpoint holds of it as plain values.
 REMEMBERED: tuple[str, ...] = ("_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off")
 REMEMBERED += ("_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink", "_weight", "_lay")
-REMEMBERED += ("_knot", "_bent", "_negative", "_first_bend")
+REMEMBERED += ("_knot", "_bent", "_negative", "_noted_bends")
 
 
 class LineStep(NamedTuple):
@@ -123,7 +124,8 @@ class Diagnostics:
         self._fold, self._twist, self._slack = self._bend, UNRESOLVED, model.slack_floor
         self._sunk = SUNK * model.length
         self._within, self._round, self._between = 1.0, False, False
-        self._first_bend = np.inf  # s, when a bend was told first: outputs are looked at after later steps
+        # s, when a bend was noted first at the start, the end and point loads: outputs are looked at after later steps
+        self._noted_bends: Floats = np.full(2 + len(model.attached), NEVER)
         self._off = OFF * model.length
         self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
@@ -169,6 +171,18 @@ class Diagnostics:
         """Watch the same line with other zones."""
         if model is not self._model:
             self._model, self._longest = model, 1.0 + borne_strain(model)
+
+    def _places(self) -> NDArray[np.int64]:
+        """Nodes of `_noted_bends`."""
+        line = self._model.line
+        loads = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
+        return np.array([0, line.h.size, *loads])
+
+    def _note_bend(self, t: float, node: int, bend: float, tension: Floats) -> None:
+        """A rod bends by an angle (rad) at a node more than its cells show."""
+        self.note(t, node, "unresolved bend", self._bend_text(node, bend, tension))
+        here = self._places() == node
+        self._noted_bends[here] = np.minimum(self._noted_bends[here], t)
 
     def note(self, t: float, node: int, kind: str, text: str) -> None:
         s = float(self._model.line.s[node])
@@ -281,13 +295,8 @@ class Diagnostics:
             return None
         node, twisted = int(sharp[1]), int(sharp[3])
         if bend > self._bend:
-            self.note(
-                t,
-                node,
-                "unresolved bend",
-                self._bend_text(node, bend, state.T),
-            )
-            self._bend, self._first_bend = 1.5 * bend, min(self._first_bend, t)
+            self._note_bend(t, node, bend, state.T)
+            self._bend = 1.5 * bend
         if twist > self._twist:
             text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
             self.note(t, twisted, "unresolved twist", text)
@@ -432,7 +441,7 @@ class Diagnostics:
             kinked = kinks_at(joints, seen.bends, line.hn)[:, 0] > self._kink
             found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
         layers = bool(model.attached) | seen.has_element(0) | seen.has_element(1)
-        found |= layers & (seen.batch.t < self._first_bend)
+        found |= layers
         if not self._weight:
             nodes, _, limits = too_long_for_weight(model.cable, line)
             if nodes.size:
@@ -634,27 +643,26 @@ class Diagnostics:
     def _layers(self, batch: Batch) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
         line, last = self._model.line, self._model.line.h.size
-        if batch.t[0] >= self._first_bend or not line.element.any():
+        if not line.element.any():
             return
         d = batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
         tangents = batch.frame[:, :, 2::3]
         ends = [(0, tangents[:, 0], d[:, 0]), (last, d[:, -1], tangents[:, 1])]
-        inner = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
-        found = list[tuple[int, int, float]]()
-        for node, before, after in [*ends, *((i, d[:, i - 1], d[:, i]) for i in inner if 0 < i < last)]:
+        places, found = self._places(), list[tuple[int, int, float]]()
+        inner = ((i, d[:, i - 1], d[:, i]) for i in places[2:].tolist() if 0 < i < last)
+        for node, before, after in [*ends, *inner]:
             beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
             if not line.element[node] or not beside:
                 continue
+            noted = self._noted_bends[places == node].min()
             cell, stiffness = min(node, last - 1), batch.stiffness(node, line)[:, :2].max(axis=1) * line.hn[node]
-            thin = (batch.T[:, cell] * line.h[cell] ** 2 > stiffness) & (batch.t < self._first_bend)
+            thin = (batch.T[:, cell] * line.h[cell] ** 2 > stiffness) & (batch.t < noted)
             angle = np.linalg.norm(after - before, axis=1) - float(np.linalg.norm(line.k0[node, :2]))
             smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / line.hn[i] for i in beside], axis=0)
             bad = np.flatnonzero(thin & (angle > ASKEW) & (smooth < LAYER * angle / line.hn[node]))
             found += [(int(k), node, float(angle[k])) for k in bad[:1]]
-        if found:
-            k, node, bend = min(found)
-            self.note(float(batch.t[k]), node, "unresolved bend", self._bend_text(node, bend, batch.T[k]))
-            self._first_bend = float(batch.t[k])
+        for k, node, bend in sorted(found):
+            self._note_bend(float(batch.t[k]), node, bend, batch.T[k])
 
     def _bends_by_weight(self, seen: Observation) -> None:
         """Bends of a rod almost without tension that are shorter than its cells."""

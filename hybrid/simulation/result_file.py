@@ -421,7 +421,7 @@ class Envelope:
         self.start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
         self.begin = 0.0  # s
         self.bounds = no_extremes(self.s.size)  # of meshes before that of now
-        pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
+        pipes = Pipes(scene) if any(x.pipe for x in scene.cable.sections) else None
         parts = _parts_of(scene, model, moves, touches) | ({"pipe"} if pipes is not None else set())
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in parts}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section

@@ -273,7 +273,10 @@ class RunZones(Part):
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on as `checkpoint` has written, of lines that have those zones.  ValueError: that cannot be."""
         for x in self.lines:
-            x.switching.restore(saved["zones"][self._run.lines[x.number].name]["switching"])
+            line = self._run.lines[x.number]
+            x.switching.restore(saved["zones"][line.name]["switching"])
+            if line.books.strains.size:  # outputs within the next step begin with the stiffness of now
+                line.books.strains[:, b.BENDS] = x.switching.model.line.kb[:, 0]
         self.note_forces()
 
     # --- steps ------------------------------------------------------------------------------------

@@ -97,6 +97,9 @@ def extreme_errors(result: StoredResult) -> dict[str, float]:
     return {name: x for run in runs for name, x in json.loads(str(run.attributes.get(EXTREME_ERRORS, "{}"))).items()}
 
 
+SHOWS = 0.1  # part by which the value of an equilibrium differs at most where output points show it
+
+
 class Held(NamedTuple):
     """A quantity against a limit of its own: its worst value, in `unit`, when (t, s) and where (s, m; None: no place).
 
@@ -257,7 +260,8 @@ def _part_of(
     k, bound = int(np.nanargmax(value)), bound_of(result)
     beyond = bound is None or bound > 1.0
     if len(result.times) == 1:  # nodes alone are between outputs
-        beyond = not value[k] > 100.0 and (not shows_ends(result) if bound is None else beyond)
+        hidden = bound is not None and 100.0 * bound > (1.0 + SHOWS) * float(value[k])  # their errors are not known
+        beyond = not value[k] > 100.0 and (not shows_ends(result) if bound is None else beyond or hidden)
     at_most = 100.0 * bound if beyond and bound is not None else None
     worst = float(value[k])
     return Held(name, limit, "%", worst, 100.0, worst > 100.0, float(t[k]), float(s[k]), beyond, bound=at_most)

@@ -32,7 +32,7 @@ from hybrid.store.envelope import (
     not_verified,
     with_partner,
 )
-from hybrid.store.limits import Held, extreme_errors, held_of, needs_moments
+from hybrid.store.limits import SHOWS, Held, extreme_errors, held_of, needs_moments
 from hybrid.store.records import Event, not_converged_in
 from hybrid.store.stored_result import StoredResult
 
@@ -251,9 +251,14 @@ def _doubts(
     for name in sorted(names - {"torque", "von_mises", "wall_tension", "contact_force"}):
         if name in unknown:
             yield Doubt(f"the error of {_words(name)} is not known: it does not converge", "shorter steps and cells")
-        elif f"error_total_{name}" not in result.attributes and f"errors/total/{name}" not in result:
+        elif not all(map(partial(_has_error, name), result.lines.values() or [result])):
             why = f"the error of {_words(name)} is not estimated"
             yield _pending(result) or Doubt(why, ESTIMATE)
+
+
+def _has_error(name: str, line: StoredResult) -> bool:
+    """Whether an error of a quantity was estimated of a line."""
+    return f"error_total_{name}" in line.attributes or f"errors/total/{name}" in line
 
 
 def _of_event(
@@ -344,7 +349,8 @@ def _reached(result: StoredResult, name: str, x: Judged) -> Doubt | None:
     allowed = _along(result, x.limit, s)
     at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - x.s).argmin())
     value = 1.0 / x.value if name == "curvature" and x.value > 0.0 else x.value
-    there = _shown(result, x.s)
+    least = abs(x.allowed) if x.limit == "min_tension" else 0.0
+    there = _shown(result, x.s) and (len(result.times) > 1 or _near(value, values[0], s, x.s, least))
     if not there and len(result.times) == 1:
         return Doubt(f"the error of {_words(name)} at s = {x.s:.5g} m is not estimated", THAT_PLACE)
     here = _size(x, x.allowed, value, errors[at] if there else 0.0)
@@ -368,6 +374,13 @@ def _shown(result: StoredResult, s: float) -> bool:
     """Whether a place, m, is between output points, whose errors are known."""
     near = 1e-9 * abs(float(result.s[-1]))
     return float(result.s[0]) - near <= s <= float(result.s[-1]) + near
+
+
+def _near(value: float, values: Floats, s: Floats, at: float, least: float = 0.0) -> bool:
+    """Whether output points beside a place, m, of an equilibrium have nearly its value: their errors are its own."""
+    k = np.searchsorted(s, at)
+    beside = values[max(k - 1, 0) : k + 1]
+    return bool((np.abs(beside - value) <= SHOWS * max(abs(value), least)).any())
 
 
 def _size(x: Judged, allowed: Floats | float, values: Floats | float, errors: Floats | float) -> Floats:
@@ -459,7 +472,7 @@ def _stress_reached(result: StoredResult, x: Held, over_steps: float) -> Doubt |
     used = (stress + error) / _along(result, "max_stress", s)
     at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - (x.s or 0.0)).argmin())
     place = x.s or 0.0
-    there = _shown(result, place)
+    there = _shown(result, place) and (len(result.times) > 1 or _near(x.value, stress[0], s, place))
     if not there and len(result.times) == 1:
         return Doubt(f"the error of the stress at s = {place:.5g} m is not estimated", THAT_PLACE)
     here = x.value + error[at] if there else 0.0
@@ -487,8 +500,19 @@ def _error_of_held(result: StoredResult, x: Held, clearance: bool) -> float | No
     if len(result.times) == 1 and not all(map(shows_ends, [*result.lines.values()] or [result])):
         return None
     if x.unit == "m" and clearance:  # of two lines the errors of both
-        return (2.0 if result.lines else 1.0) * float(figures["error_total_position"])
+        both, error = 2.0 if result.lines else 1.0, float(figures["error_total_position"])
+        if len(result.times) > 1:
+            return both * error
+        chords = [_off_chords(line) for line in result.lines.values() or [result] if f"{GROUP}/curvature_max" in line]
+        # places that stay, whose errors are 0, are not those that it is about
+        return both * (error + max(chords)) if error > 0.0 and chords else None
     return None
+
+
+def _off_chords(line: StoredResult) -> float:
+    """How far a line is off the chords of its mesh, m, at most."""
+    bends = line[f"{GROUP}/curvature_max"]
+    return float(np.nanmax(np.diff(line[f"{GROUP}/s"]) ** 2 * np.maximum(bends[:-1], bends[1:]), initial=0.0)) / 8.0
 
 
 # ---- accuracy -------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ from hybrid.studies.workers import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
 from tests.called import Call
-from tests.scenes import cable_scene, pinned_at
+from tests.scenes import cable_scene, line_between, network_scene, pinned_at
 
 LIMITS = ("min_bend_radius", "max_tension", "min_tension")
 CLAMPED = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1]}
@@ -456,8 +456,8 @@ class Made(dict[str, Any]):
     def __init__(
         self, values: dict[str, Any], lines: Iterable[str] = (), moves: bool = False, **attributes: Any
     ) -> None:
-        super().__init__(values)
-        self.attributes, self.lines, self.line_name = attributes, {x: Made({}) for x in lines}, ""
+        super().__init__({"envelope/s": np.array([0.0, 10.0]), "envelope/curvature_max": np.zeros(2)} | values)
+        self.attributes, self.lines, self.line_name = attributes, {x: Made({}, **attributes) for x in lines}, ""
         self.times, self.s = np.arange(3.0 if moves else 1.0), np.array([0.0, 10.0])
         self.events: list[Event] = []
         self.status, self.pending, self.zones = "complete", "", []
@@ -600,3 +600,54 @@ def test_a_mooring_line_has_the_error_of_its_largest_tension(
     held = Held("code_used", "code", "%", 60.0, 100.0, False, 0.0, 0.0, False)
     made = Made(ranges() | {"code": np.array([row])}, moves=True, accuracy_extremes=json.dumps(figures))
     assert judged_so(monkeypatch, held, made).verdict == verdict
+
+
+# --- at rest: what output points do not show -------------------------------------------------------
+
+
+def at_rest(points, length, span, cells, quantities=None, model="rod", **section):
+    given = {"length": length, "mass": 10, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 200} | section
+    output = {"errors": True, "points": points, "quantities": quantities or {}}
+    ends = pinned_at(0, 0, 0), pinned_at(span, 0, 0)
+    return hybrid.static(cable_scene(given, *ends, model=model, mesh=cells, output=output))
+
+
+@pytest.mark.parametrize("points", [101, 2, [0, 10, 30]])
+def test_stress_at_rest_is_judged_at_nodes(points):
+    area, inertia = np.pi / 4 * (0.05**2 - 0.04**2), np.pi / 64 * (0.05**4 - 0.04**4)
+    pipe = {"wall": 0.005, "modulus": 2e11, "max_stress": 1.7265e8}  # 1.744e8 Pa at the middle
+    given = {"pipe": pipe, "axial_stiffness": 2e11 * area, "bending_stiffness": 2e11 * inertia}
+    (found,) = at_rest(points, 30, 29, 10, **given).verdicts().quantities
+    assert found.verdict == "broken" and found.value == pytest.approx(1.7428e8, rel=1e-3) and found.s == 15.0
+
+
+@pytest.mark.parametrize("points", [101, 2, [0, 33, 100]])
+def test_errors_of_places_that_outputs_do_not_show(points):
+    bend = at_rest(points, 100, 70, 10, min_bend_radius=23.21)  # 23.097 m on 400 cells, 23.41 on 10
+    assert bend.verdicts().words["min_bend_radius"] == "not verified"
+    both = at_rest(points, 100, 70, 10, capacity=[[1e5, 0], [0, 0.0455]])
+    assert both.verdicts().words["capacity_used capacity"] == "not verified"
+
+
+@pytest.mark.parametrize(("cells", "points"), [(9, 2), (9, 3), (15, 101), (25, 101)])
+def test_clearances_at_rest_are_those_of_chords(cells, points):
+    below = {"below": {"kind": "clearance", "point": [35, 0, -50], "smallest": 18.0}}  # 17.980 m on 400 cells
+    (found,) = at_rest(points, 100, 70, cells, below, "catenary").verdicts().quantities
+    assert found.value > 18.0 and found.verdict == "not verified"
+
+
+def test_errors_of_another_line_say_nothing():
+    section = {"mass": 10, "diameter": 0.05, "axial_stiffness": 1e6}
+    points = {
+        "a": {"position": [0, 0, 0]}, "b": {"position": [60, 0, 0]}, "k": {"initial_guess": [20, 0, -10], "mass": 100},
+    }  # fmt: skip
+    lines = {
+        "short": line_between("a", "k", section | {"length": 30}, model="catenary", mesh=2),
+        "long": line_between("k", "b", section | {"length": 50}, model="catenary", mesh=40),
+    }
+    pull = {"kind": "vertical_force", "line": "short", "end": "start", "smallest": -4650}  # -4653.2 N on 80 cells
+    output = {"errors": True, "points": 11, "quantities": {"pull": pull}}
+    result = hybrid.static(network_scene(points, lines, output=output))
+    assert "no error figure" in {event.kind for event in result.events}
+    (found,) = result.verdicts().quantities
+    assert found.verdict == "not verified"

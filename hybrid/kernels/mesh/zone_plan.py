@@ -68,8 +68,8 @@ def mark_spread(asks, base, buffer, out):
 def reach(T, base_of_cell, EI, w, floor, parts, light, buffer):
     """Buffers (n,) m of base cells: `parts` times sqrt(EI/T), or (EI/w)^(1/3) where that is shorter.
 
-    Of the lowest tension in a base cell, and of that of its two nodes where it is longer; light: least weight that
-    counts, N/m.
+    Of the lowest tension in a base cell, and of that of its two nodes where it is shorter: nodes have the stiffness of
+    the stiffer side; light: least weight that counts, N/m.
     """
     first = 0
     for i in range(T.size):
@@ -78,10 +78,10 @@ def reach(T, base_of_cell, EI, w, floor, parts, light, buffer):
             first, least = i, T[i]
         least = min(least, T[i])
         if i + 1 == T.size or base_of_cell[i + 1] != j:
-            buffer[j] = 0.0
+            buffer[j] = math.inf
             for k in (first, i + 1):
                 long = min((EI[k] / max(w[k], light)) ** (1.0 / 3.0), math.sqrt(EI[k] / max(least, floor[k])))
-                buffer[j] = max(buffer[j], parts * long)
+                buffer[j] = min(buffer[j], parts * long)
 
 
 @inner
