@@ -265,7 +265,7 @@ class SectionLayer(NamedTuple):
 
 def hidden_layer(model: Model, seen: Observation) -> SectionLayer | None:
     """The first output, and change of section, whose bend is not shown; None: there is none."""
-    line, cable = seen.line, model.cable
+    line, cable, first = seen.line, model.cable, None
     for node in seen.changes:
         if not 1 < node < line.h.size - 1:
             continue
@@ -274,9 +274,9 @@ def hidden_layer(model: Model, seen: Observation) -> SectionLayer | None:
         if not (EI.min() > 0.0 and EI.max() > MORE * EI.min()):
             continue
         found = _hidden_at(model, seen, node, EI)
-        if found is not None:
-            return found
-    return None
+        if found is not None and (first is None or found.output < first.output):
+            first = found
+    return first
 
 
 def _hidden_at(model: Model, seen: Observation, node: int, EI: Floats) -> SectionLayer | None:

@@ -412,10 +412,10 @@ class Envelope:
         touches: whether it is one in which lines touch each other.
         """
         layout = model.layout if moves else None
-        nodes = model.line.s.copy() if layout is None else layout.finest.nodes
+        nodes = model.nodes.copy() if layout is None else layout.finest.nodes
         if moves and model.payout is not None:
             nodes = model.payout.finest
-        marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
+        marked = model.nodes[np.flatnonzero(marks_of(scene, model))]
         self._nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
         self.start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
@@ -448,6 +448,7 @@ class Envelope:
         """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
         s, at = model.line.s, np.clip(self._nodes, model.line.s[0], model.line.s[-1])
         self.start[:] = Grid(s, model.zones, at, model.attached).nodes @ r
+        self.start[np.searchsorted(self._nodes, model.nodes)] = r  # to the last bit: a restored line counts from there
 
     def start_of(self, nodes: Floats) -> Floats:
         """Positions (N+1, 3) m from which displacements of nodes (N+1,) m count."""

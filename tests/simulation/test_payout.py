@@ -511,3 +511,41 @@ def test_velocity_of_a_line_that_is_paid_out_is_that_of_its_material() -> None:
     ))  # fmt: skip
     rate = (found.position[2:] - found.position[:-2]) / (found.t[2:] - found.t[:-2])[:, None, None]
     assert np.abs(found.velocity[1:-1] - rate)[2:].max() < 0.03  # m/s, of 1.3
+
+
+@pytest.mark.parametrize("length, at", [(6.7, 2.619), (7.0, 2.736)])
+def test_the_equilibrium_of_a_line_with_modules_and_a_winch_at_its_start_is_written(length: float, at: float) -> None:
+    section = {"length": length, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5}
+    modules = [{"kind": "modules", "range": [at, at + 1.0], "buoyancy": 5.0, "mass": 1.0}]
+    winch = {"longest": 2 * length, "winch": {"tension": 30.0, "inertia": 40.0}}
+    scene = cable_scene(section, pinned_at(0, 0, 0, payout=winch), pinned_at(0.8 * length, 0, 0), attachments=modules,
+                        fluid={"density": 1025}, model="catenary", mesh=11, time=(0.1, 0.02), contact={"self": False})  # fmt: skip
+    tension = hybrid.static(scene)["envelope/tension_max"]
+    assert tension.size == 14 and np.isfinite(tension).all()
+
+
+def displacements(trial: bool) -> np.ndarray:
+    """Largest displacements of a run from a winch with a clamp; trial: its first step is tried, and taken back."""
+    length = 9.401267082947454
+    section = {"length": length, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 1.0}
+    clamp = {
+        "kind": "clamped",
+        "position": [7.5, 1, 0.31],
+        "tangent": [1, 0, 0.3],
+        "payout": {"rate": 0.3, "ramp": 0.1},
+    }
+    scene = cable_scene(
+        section, pinned_at(0.1, 0.3, -0.7), clamp, model="rod", mesh=15, time=(0.06, 0.02), contact={"self": False}
+    )
+    with hybrid.Simulation(scene) as sim:
+        if trial:
+            saved = sim.save()
+            sim.step()
+            sim.restore(saved)
+        for _ in range(3):
+            sim.step()
+        return np.asarray(sim.result()["envelope/displacement_max"])
+
+
+def test_displacements_after_a_step_that_is_taken_back_are_those_without_it() -> None:
+    np.testing.assert_array_equal(displacements(True), displacements(False))

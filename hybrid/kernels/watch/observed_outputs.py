@@ -470,7 +470,7 @@ def observe_layers(tables, points, less):
             if not is_hinge(x.line, x, end) or not one > 0.0:
                 continue
             size, one, direction = one, 1.0, bend_direction(x.line, x.e, 1 + end * (n - 2))
-            while 0 < i + way < n and one > 0.0:
+            while 0 < i + way < n and one > 0.0 and not x.line.spin[min(i, i + way)]:  # rods keep others there
                 j = i + way
                 two = x.strains[j, LAYER + end]
                 deep = min(depth_of(x.T[min(i, j)], x.hinges[end, 0], x.line.h[min(i, j)]), STEEPEST)
