@@ -248,7 +248,8 @@ class PayingOut:
         """The line goes on with other nodes at t (s), to which its state has been carried; s: m, nodes of before."""
         if out.wake.size and out.wake.shape > state.wake.shape:
             self._blend_phases(s, out)
-        new.reel.true[self.count - 1] = self.length - self.plan.layer[0] - self.plan.nodes[self.count - 1]
+        grows = new.reel.true.size - self.rides - 1
+        new.reel.true[grows] = self.length - self.plan.layer[0] - self.plan.nodes[self.count - 1]
         self.reel = new.reel
         self._fit(new.model.line, new.reel, self.length, t)
 
