@@ -193,7 +193,8 @@ class Codes(OfSections):
         """(ns, nb) %."""
         section = self.numbers(v.grid.points, v.grid.after)
         z, found = (v.grid.nodes @ v.r)[:, 2], np.full(v.tension.shape, np.nan)
-        catenary = np.asarray(v.grid.sides @ (~v.side_is_rod[:, None]).astype(float)) > 0.0
+        lies = np.repeat(~v.side_is_rod[:, None], v.columns, axis=1)
+        catenary = np.asarray(v.grid.sides @ lies.astype(float)) > 0.0
         s, near, sleeved = v.grid.points, self._near, np.zeros(v.tension.shape, bool)  # a sleeve bears what is its own
         for a, b in self._sleeves:
             sleeved |= (s >= a - near) & (s <= b + near)

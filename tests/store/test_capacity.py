@@ -435,3 +435,19 @@ def test_a_pipe_in_a_sleeve_is_checked_by_its_own_moment():
     at = int(np.abs(inside.s - 1.0).argmin())
     assert inside.curvature[0, at] < 0.11 * bare.curvature[0, at]
     assert inside.code_used[0, at] < 0.11 * bare.code_used[0, at]
+
+
+@pytest.mark.parametrize("model", ["rod", "adaptive"])
+def test_line_that_is_paid_out_has_what_its_code_lets_it_use(model):
+    """Some outputs at once as each by itself: it was no result at all."""
+    pipe = {"length": 20, "mass": 60, "diameter": 0.2, "axial_stiffness": 1e8, "bending_stiffness": 6e5}
+    pipe |= {"torsional_stiffness": 4.6e5, "pipe": {"wall": 0.01}, "code": CODE}
+    winch = pinned_at(2, 0, -28, payout={"rate": 0.5, "ramp": 0.2, "longest": 22})
+    one, other = (
+        hybrid.run(cable_scene(
+            pipe, clamped_at([0, 0, -10], [0, 0, -1]) if model == "rod" else pinned_at(0, 0, -10), winch, model=model,
+            mesh=20, fluid={"density": 1025, "surface": 0}, time=(0.4, 0.05), output=(every, 11)
+        )) for every in (0.1, 0.4)
+    )  # fmt: skip
+    assert np.nanmax(one.code_used) > 0.0
+    np.testing.assert_allclose(one.code_used[-1], other.code_used[-1])
