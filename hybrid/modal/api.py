@@ -139,8 +139,9 @@ def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction
     count = int(count)
     fine, coarse = (_modes_on_mesh(asked, cells, count, near, friction) for cells in (1.0, 2.0))
     squares = fine.eigen.squares
-    costly = squares > COSTS_NOTHING * max(float(np.abs(squares).max()), 1e-300)
-    unstable = squares < -COSTS_NOTHING * float(np.abs(squares).max())
+    largest = max(float(np.abs(squares).max()), 1e-300)
+    nothing = COSTS_NOTHING * np.clip(_stiffest(fine), 1e-6 * largest, largest)  # what nothing holds at all: round-off
+    costly, unstable = squares > nothing, squares < -nothing
     chosen = np.flatnonzero(costly)
     if near is not None:
         w = 2.0 * math.pi / near
@@ -156,6 +157,12 @@ def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction
     along, places = {x.name: x.line.s.copy() for x in lines}, {x.name: x.r.copy() for x in lines}
     cells = sum(x.line.h.size for x in lines)
     return Modes(asked.title, tuple(found), along, places, whole, cells, tuple(notes))
+
+
+def _stiffest(found: _ModesOnMesh) -> Floats:
+    """w^2 (m,), 1/s2, of each mode if all that it moves held it: round-off of its own is a part of that."""
+    A, size = found.network.stiffness, np.abs(found.eigen.vectors)
+    return np.asarray(np.einsum("ij,ij->j", size, np.abs(A) @ size))
 
 
 def _check(count: int, near: float | None) -> None:

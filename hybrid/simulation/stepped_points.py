@@ -24,6 +24,7 @@ from hybrid.model.build import Model
 from hybrid.model.ends import STILL, DrivenEnd, EndConditions, contradictions, rotation_vector
 from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkModel
+from hybrid.outputs.observed_states import Grid
 from hybrid.scene.base import dotted
 from hybrid.scene.ends import Fairlead
 from hybrid.scene.network import Network
@@ -358,8 +359,12 @@ class SteppedPoints(SettableObstacles):
     def line(self, name: str) -> CableState:
         """Where a line is now; arrays of one's own."""
         k = self._line(name)
-        model, x = self._run.model.models[k], self._run.state.lines[k]
-        return CableState(self.t, model.line.s.copy(), x.r.copy(), x.v.copy(), x.T.copy(), model.zones)
+        run, v = self._run, self._run.state.lines[k].v.copy()
+        model, x, line = run.model.models[k], run.state.lines[k], run.lines[k]
+        if line.paying is not None:  # of the material, which passes nodes that go along with the winch
+            _, seen, _ = line.observe(line.state_now(run.t, run.solver.lines[k].ends, x, run.solver.work[k]))
+            v = seen.on(Grid(model.line.s, model.zones, model.line.s, model.attached)).velocity[:, :, 0]
+        return CableState(self.t, model.line.s.copy(), x.r.copy(), v, x.T.copy(), model.zones)
 
     @one_thread
     def point(self, name: str) -> PointState:

@@ -384,3 +384,12 @@ def test_few_cells_that_do_not_stretch_have_modes(cells):
         tables = cable_scene(section, pinned(0, 0, 0), pinned(30, 0, -30), model="catenary", mesh=cells)
         periods.append([x.period for x in hybrid.modes(tables, 4).modes])
     assert periods[0] == pytest.approx(periods[1], rel=1e-4)
+
+
+def test_the_longest_periods_are_there_however_many_modes_are_asked_for():
+    section = {"length": 200.0, "mass": 1.2, "diameter": 0.02, "axial_stiffness": 2.4e7}
+    rov = {"kind": "body", "mass": 20000.0, "volume": 19.5, "initial_guess": [0, 0, -200]}
+    tables = cable_scene(section, pinned(0, 0, 0), rov, model="catenary", mesh=10, fluid={"density": 1000}, dimension=3)
+    few, many = hybrid.modes(tables, 4), hybrid.modes(tables, 30)
+    assert [x.period for x in many.modes[:4]] == pytest.approx([x.period for x in few.modes], rel=1e-6)
+    assert not any("nothing holds" in x for x in many.notes)

@@ -549,3 +549,21 @@ def displacements(trial: bool) -> np.ndarray:
 
 def test_displacements_after_a_step_that_is_taken_back_are_those_without_it() -> None:
     np.testing.assert_array_equal(displacements(True), displacements(False))
+
+
+def test_velocity_of_the_state_of_a_line_that_is_paid_out_is_that_of_its_material() -> None:
+    section = {"length": 40, "mass": 6, "diameter": 0.06, "axial_stiffness": 5e5, "bending_stiffness": 400}
+    weight = {"kind": "body", "mass": 200, "volume": 0.05, "drag_area": 0.3}
+    clamp = clamped_at([0, 0, 0], [-0.3, 0, 1], payout={"rate": 1, "ramp": 0.5, "longest": 46})
+    scene = cable_scene(
+        section, weight, clamp, model="rod", mesh=20, fluid={"density": 1025}, time=(1.2, 0.04), output=(0.08, 11)
+    )
+    with hybrid.Simulation(scene) as simulation:
+        while simulation.t < 1.1:
+            simulation.step()
+        one = simulation.state
+        simulation.step()
+        two = simulation.state
+    places = [np.stack([np.interp(37.0, x.s, x.position[:, i]) for i in range(3)]) for x in (one, two)]
+    there = np.stack([np.interp(37.0, one.s, one.velocity[:, i]) for i in range(3)])
+    assert np.abs(there - (places[1] - places[0]) / (two.t - one.t)).max() < 0.05  # 1.0 m/s
