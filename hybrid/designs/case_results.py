@@ -17,7 +17,7 @@ import numpy as np
 
 from hybrid.designs.in_motion import DIFFERENCES, TANGENTS, Motion, followed, size_of
 from hybrid.designs.network_at_rest import NO_PLACES, NetworkAtRest, Places, at_rest
-from hybrid.designs.numbers_and_results import number_of, parse_wanted, scene_with
+from hybrid.designs.numbers_and_results import at_end, number_of, parse_wanted, scene_with
 from hybrid.designs.replay import Course, course_of
 from hybrid.designs.tangents import Unfollowed, has_two_sides, step_of
 from hybrid.errors import ComputationError, Outcome
@@ -382,7 +382,7 @@ class Equilibria:
             if case in self.motions.rows and not self.rows[case].size:
                 continue
             self.count += 1
-            of = [self.wanted[k][1] for k in self.rows[case]]
+            of = [at_end(self.scenes[case], self.wanted[k][1]) for k in self.rows[case]]
             rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))
             self._places.setdefault(case, rests[case].places)
         point = Point(x.copy(), rests, self.motions.runs_of(x, cells < 1.0, moving), self)

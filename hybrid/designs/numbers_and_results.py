@@ -331,6 +331,12 @@ def parse_wanted(asked: Scene, text: str, moves: bool) -> Wanted:
     return Wanted(over or "", line or "", name, axis or "", np.inf if s == cable.length else s, of_section, time)
 
 
+def at_end(asked: Scene, text: str) -> str:
+    """A result of an equilibrium; what is at the end of its line in this scene is so with any length."""
+    end = parse_wanted(asked, text, moves=False).at == np.inf
+    return f"{text.partition('@')[0]}@end" if end else text
+
+
 def _place_of(text: str, at: str | None, length: float) -> float | None:
     """The place of a result, m; None: it has none.  SceneError: it is not on the line."""
     if at is None:

@@ -19,7 +19,7 @@ def hanging(X=0.0, F=60.0, fy=0.0, fz=0.0, **more):
     )
 
 
-FORCE = "ends.end.force[0]"
+FORCE, LENGTH = "ends.end.force[0]", "cable.sections[0].length"
 
 
 def test_a_number_that_is_seen_alone_has_its_own_deviation(tmp_path):
@@ -170,3 +170,16 @@ def test_output_points_at_the_end_of_a_line_stay_there_when_its_length_is_sought
         tables = cable_scene(section, *ends, model="catenary", mesh=20, output=output)
         key, of = "cable.sections[0].length", "tension@end"
     assert hybrid.seek(tables, {of: 60e3}, [key]).results[of] == pytest.approx(60e3)
+
+
+def test_a_place_at_the_end_of_a_line_stays_there_when_its_length_is_sought():
+    """Lines of other lengths are asked at their end, whether that is written as `end` or in m."""
+    section = {"length": 20.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5}
+    scene = cable_scene(section, pinned_at(0, 0, 0), pinned_at(15, 0, 0), model="catenary", mesh=20)
+    for target in (222.0, 230.0):
+        one, two = (hybrid.seek(scene, {of: target}, [LENGTH]) for of in ("tension@20", "tension@end"))
+        assert one.numbers == two.numbers
+    for at in (20, "end"):
+        aim = {"top": {"quantity": "tension", "at": at, "value": 222.0}}
+        found = hybrid.design(scene, unknowns={"L": {"key": LENGTH}}, targets=aim)
+        assert found.numbers["L"] == pytest.approx(19.2378, abs=1e-4)
