@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
+from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -208,7 +209,15 @@ class Codes(OfSections):
 
     def rows(self) -> Floats:
         """(K, columns) of `Row`."""
-        return np.array([x for x in self._rows if x is not None], float)
+        return np.array([part for x in self._rows if x is not None for part in self._parts(x)], float)
+
+    def _parts(self, row: Row) -> list[Row]:
+        """A row, cut where sleeves begin and end."""
+        edges = sorted({s for s in chain(*self._sleeves) if row.first + self._near < s < row.last - self._near})
+        parts = [row._replace(first=a, last=b) for a, b in pairwise([row.first, *edges, row.last])]
+        return [
+            x._replace(sleeved=float(any(a < 0.5 * (x.first + x.last) < b for a, b in self._sleeves))) for x in parts
+        ]
 
 
 # Lowest and highest values, over every step, of the quantities that a scene asks for by name.

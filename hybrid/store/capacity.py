@@ -307,7 +307,8 @@ class Row(NamedTuple):
     """The code of a section from `first` to `last` (m), as a row of the file; pressures at heights as of a pipe.
 
     strength: N, of E301; of F201 0.  outer, wall: m.  safety: g.  ovality: of the wall; fabrication: alpha_fab.
-    stiffness: N m2, of bending; natural: 1/m, curvature without load; files of 1.0.0 have neither.
+    stiffness: N m2, of bending; natural: 1/m, curvature without load; sleeved: 1 where a sleeve bears a part of the
+    moment; files of 1.0.0 have none of these.
     """
 
     first: float
@@ -333,6 +334,7 @@ class Row(NamedTuple):
     surface: float
     stiffness: float = 0.0
     natural: float = 0.0
+    sleeved: float = 0.0
 
 
 def use(row: Row, T: Floats, M: Floats, z: Floats) -> Floats:
@@ -461,7 +463,8 @@ def code_with_errors(result: StoredResult) -> float | None:
 def _moments(result: StoredResult, name: str, read: Callable[[str], Floats]) -> Callable[[Row], Floats] | None:
     """What has the moments (N m) of a row, from `name` of moment and curvature; None: the result has not all of them.
 
-    A line that is a catenary somewhere, at some time, may have those of its curvature; a mooring line needs none.
+    A line that is a catenary somewhere, at some time, may have those of its curvature, and in a sleeve no line has
+    more; a mooring line needs none.
     """
     if not any(row.kind == F201 for row in rows_of(result)):
         return lambda row: np.zeros_like(read(name % "tension"))
@@ -469,9 +472,17 @@ def _moments(result: StoredResult, name: str, read: Callable[[str], Floats]) -> 
     needs = {"bending_moment": "rod" in kinds, "curvature": kinds != {"rod"}}
     if any(needed and name % x not in result for x, needed in needs.items()):
         return None
-    known = {x: read(name % x) for x, needed in needs.items() if needed}
-    rods, curvature = known.get("bending_moment", np.zeros(1)), known.get("curvature")
-    return lambda row: rods if curvature is None else np.maximum(rods, moment_of(row, curvature))
+    rods = read(name % "bending_moment") if needs["bending_moment"] else np.zeros(1)
+    curvature = read(name % "curvature") if name % "curvature" in result else None
+
+    def moment(row: Row) -> Floats:
+        if curvature is None:
+            return rods
+        own = moment_of(row, curvature)
+        M = np.fmin(rods, own) if row.sleeved else rods
+        return np.maximum(M, own) if needs["curvature"] else M
+
+    return moment
 
 
 def _largest_by_code(result: StoredResult, s: Floats, part: Callable[[Row, np.ndarray], Floats]) -> float | None:
