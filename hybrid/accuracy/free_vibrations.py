@@ -23,7 +23,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import DAMPING
 from hybrid.kernels.state.report import BENDING_SLIP, BODIES, DRAG, SOIL
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.eigen import BELOW, lowest_modes
+from hybrid.linear.eigen import BELOW, lowest_modes, round_off
 from hybrid.linear.loaded_line import LoadedLine, frequencies_of, loaded_lines
 from hybrid.linear.matrices import (
     ANCHOR,
@@ -50,8 +50,6 @@ MODES, MOST_MODES = 12, 48
 GAUSS = 8  # points of the rule
 FEWEST_PIECES = 8  # at least
 MOST_PERIODS = 200  # modes with more are left out: a ramp that is so long leaves nothing
-# w^2 below this part of the largest found is that of a motion that nothing holds.
-HELD = 1e-8
 # Times at which amplitudes are followed as they die; rate of that, of the velocity of a harmonic and its drag.
 DYING, HARMONIC = 60, 4.0 / (3.0 * pi)
 # Frequencies of a motion and of a vibration count as different by at least so many rad in the duration.
@@ -183,8 +181,9 @@ class Vibrations:
         self.lines = loaded_lines(rest, network, self.omegas)
         free = 2 + len(self.lines) + 3 * network.bodies  # that may have no period
         eigen = lowest_modes(network, min(MODES * len(self.lines), MOST_MODES) + free)
-        self.stable = bool(eigen.squares.min() > -HELD * np.abs(eigen.squares).max())
-        kept = eigen.squares > HELD * eigen.squares.max()
+        nothing = round_off(network, eigen)
+        self.stable = bool((eigen.squares > -nothing).all())
+        kept = eigen.squares > nothing
         self.w, self.vectors = np.sqrt(eigen.squares[kept]), eigen.vectors[:, kept]
         whole = np.asarray(network.place @ self.vectors)
         self.parts = [whole[a:b] for a, b in pairwise(network.at)]  # (5 (N+1), m) of each line
@@ -298,7 +297,7 @@ class Vibrations:
         K, M = x.linear.stiffness[:, first : first + 3], x.linear.mass[:, first : first + 3]
         return np.asarray(K.T @ part - (M.T @ part) * self.w**2)
 
-    def _amplitudes(self, breaks: list[float], quiet: float, duration: float, fits: Floats) -> Floats:
+    def _amplitudes(self, breaks: list[float], quiet: float, duration: float, fits: np.ndarray) -> Floats:
         """Of the free vibrations that are there once ends move as harmonics alone, (m,), by modes of mass 1.
 
         q'' + w^2 q = -drive u'': integral of u'' exp(-i w t) until then, less what harmonics go on to add.

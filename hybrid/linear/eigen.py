@@ -36,6 +36,9 @@ ASIDE = 1.37e-3  # each by this part farther off
 LEFT = 1e-3  # residual of a mode's equations, of their largest term, at most,
 NO_FORCE = 1e-13  # and of the largest stiffness: round-off
 SEED = 1
+# A mode costs nothing whose w^2 is below this part of what it were if all that it moves held it,
+COSTS_NOTHING = 1e-8
+NO_SQUARE = 1e-6  # which counts as at least this part of the largest found
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,13 @@ def lowest_modes(network: LinearNetwork, count: int, near: float | None = None) 
         away = np.abs(np.sqrt(np.maximum(squares, 0.0)) - near)
         chosen = np.sort(np.argsort(away)[:count])
     return Eigen(squares[chosen], _turned_apart(squares[chosen], vectors[:, chosen]), missed)
+
+
+def round_off(network: LinearNetwork, found: Eigen) -> Floats:
+    """w^2 (m,), 1/s^2, within which that of a mode is none, whatever the stiffest mode that was found with it."""
+    size, largest = np.abs(found.vectors), max(float(np.abs(found.squares).max()), 1e-300)
+    held = np.einsum("ij,ij->j", size, np.abs(network.stiffness) @ size)
+    return np.asarray(COSTS_NOTHING * np.clip(held, NO_SQUARE * largest, largest))
 
 
 def _turned_apart(squares: Floats, vectors: Floats) -> Floats:

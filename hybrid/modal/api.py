@@ -25,7 +25,7 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, PLACE, V
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.eigen import Eigen, lowest_modes
+from hybrid.linear.eigen import Eigen, lowest_modes, round_off
 from hybrid.linear.loaded_line import (
     LoadedLine,
     LoadedMembers,
@@ -56,8 +56,6 @@ from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.root import Scene
 
 MOST = 200  # modes that may be asked for
-# A motion whose w^2 is below this part of that of the first other mode costs nothing.
-COSTS_NOTHING = 1e-8
 # Shapes on two meshes are of the same mode where their common part is at least this, of frequencies this near.
 SAME_SHAPE, NEAR = 0.8, 0.3
 PLACES = 101  # of each line, at which shapes are compared
@@ -138,9 +136,7 @@ def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction
     _check(count, near)
     count = int(count)
     fine, coarse = (_modes_on_mesh(asked, cells, count, near, friction) for cells in (1.0, 2.0))
-    squares = fine.eigen.squares
-    largest = max(float(np.abs(squares).max()), 1e-300)
-    nothing = COSTS_NOTHING * np.clip(_stiffest(fine), 1e-6 * largest, largest)  # what nothing holds at all: round-off
+    squares, nothing = fine.eigen.squares, round_off(fine.network, fine.eigen)
     costly, unstable = squares > nothing, squares < -nothing
     chosen = np.flatnonzero(costly)
     if near is not None:
@@ -157,12 +153,6 @@ def modes(scene: SceneLike, count: int = 10, near: float | None = None, friction
     along, places = {x.name: x.line.s.copy() for x in lines}, {x.name: x.r.copy() for x in lines}
     cells = sum(x.line.h.size for x in lines)
     return Modes(asked.title, tuple(found), along, places, whole, cells, tuple(notes))
-
-
-def _stiffest(found: _ModesOnMesh) -> Floats:
-    """w^2 (m,), 1/s2, of each mode if all that it moves held it: round-off of its own is a part of that."""
-    A, size = found.network.stiffness, np.abs(found.eigen.vectors)
-    return np.asarray(np.einsum("ij,ij->j", size, np.abs(A) @ size))
 
 
 def _check(count: int, near: float | None) -> None:

@@ -200,6 +200,22 @@ def test_the_bed_and_the_water_have_their_part_in_them():
     assert np.abs(w / held - 1.0).min() < 0.01
 
 
+def test_the_longest_period_is_among_them_whatever_the_shortest_is():
+    """A body of 200 t that sinks with 4.9 kN: of few cells all modes along the wire are found as well."""
+    travel = {"travel": {"by": [40, 0, 0], "over": 60}}
+    section = {"length": 200.0, "mass": 5.5, "diameter": 0.03, "axial_stiffness": 1.4e8}
+    body = {"kind": "body", "mass": 2e5, "volume": 199.5, "initial_guess": [0, 0, -200]}
+    periods = []
+    for cells in (5, 20):
+        scene = hybrid.validate_scene(cable_scene(
+            section, pinned_at(0, 0, 0, motion=travel), body, model="catenary", mesh=cells, fluid={"density": 1000},
+            dimension=3, time=(3000.0, 10.0)
+        ))  # fmt: skip
+        periods.append(2.0 * np.pi / f.Vibrations(at_rest(scene)).w[0])
+        assert lost(scene, 300)["position"].amplitude > 30.0
+    assert periods[0] == pytest.approx(periods[1], rel=0.01)
+
+
 def test_what_a_move_leaves():
     """Against the same oscillators, integrated in short steps; at its end a string drives mode n by sqrt(2 m L)/(n pi)."""
     found = f.Vibrations(at_rest(hybrid.validate_scene(taut())))
