@@ -130,28 +130,19 @@ def divided(s: Floats, parts: int) -> Floats:
 
 
 def _with_cuts(nodes: Floats, cuts: Sequence[float]) -> list[float]:
-    """`nodes` with each cut as a node: those before a cut are done, those behind it as they were."""
-    behind, tolerance = nodes.tolist(), 1e-9 * float(nodes[-1] - nodes[0])
-    done, fixed, j = behind[:1], [True], 1  # j: the first node behind what is done
-    for c in sorted(cuts):
-        while behind[j] < c:
-            done.append(behind[j])
-            fixed.append(False)
-            j += 1
-        left, right, last = done[-1], behind[j], j == len(behind) - 1
-        if c - left <= right - c:
-            near, moves = c - left, not fixed[-1] and c - left < 0.5 * min(left - done[-2], right - left)
-            if near <= tolerance or moves:
-                done[-1] = c if len(done) > 1 else left
-                fixed[-1] = True
-                continue
-        elif right - c <= tolerance and last:
-            continue
-        elif right - c <= tolerance or (not last and right - c < 0.5 * min(right - left, behind[j + 1] - right)):
-            j += 1  # it moves to the cut
-        done.append(c)
-        fixed.append(True)
-    return done + behind[j:]
+    """`nodes` with each cut as a node, in place of the nearest one if that is near; the same from either end.
+
+    Near is less than half of the shorter cell beside it, and than the distance to the cut on the other side.
+    """
+    h, same = np.diff(nodes), 1e-9 * float(nodes[-1] - nodes[0])
+    c = np.array(sorted(x for x in cuts if nodes[0] + same < x < nodes[-1] - same))
+    c = c[np.append(np.diff(c) > same, True)[: c.size]]
+    k = np.searchsorted(0.5 * (nodes[1:] + nodes[:-1]), c)
+    d, gaps = nodes[k] - c, np.concatenate([[np.inf], np.diff(c), [np.inf]])[: c.size + 1]
+    half = np.concatenate([[0.0], 0.5 * np.minimum(h[:-1], h[1:]), [0.0]])[k]
+    near = np.minimum(half, np.where(d > 0.0, gaps[:-1], gaps[1:])) * (1.0 - 1e-9)
+    kept = np.delete(nodes, k[np.abs(d) < np.maximum(near, same)])
+    return np.sort(np.concatenate([kept, c])).tolist()
 
 
 def given_nodes(

@@ -147,3 +147,16 @@ def test_a_line_that_falls_into_a_point_has_no_first_shape_of_loads():
         )
     )
     assert np.isfinite(build(one_line(scene)).start.r).all()
+
+
+@pytest.mark.parametrize("length", [15.0, 15.3])
+@pytest.mark.parametrize("places", [[4.34, 5.44], [3.48, 3.88], [3.0, 3.4, 3.6, 8.9], [2.5, 2.51]])
+def test_nodes_of_a_line_that_is_counted_from_its_other_end_are_the_same(length: float, places: list[float]) -> None:
+    """Where clumps are near each other there was a cell more or less from one end."""
+    section, ends = {"length": length, "mass": 2.0, "axial_stiffness": 1e6}, (pinned_at(0, 0, 0), pinned_at(12, 0, 0))
+    found = []
+    for of, x in ((ends, places), (ends[::-1], [15.0 - s for s in reversed(places)])):
+        clumps = [{"kind": "clump", "at": s * length / 15.0, "mass": 5.0} for s in x]
+        tables = cable_scene(section, *of, attachments=clumps, model="catenary", mesh=15)
+        found.append(build(one_line(hybrid.validate_scene(tables))).line.s)
+    assert found[0] == pytest.approx(length - found[1][::-1])
