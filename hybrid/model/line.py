@@ -48,19 +48,22 @@ OF_WHOLE_LINE = ("bits", "plane", "torsion", "law_table", "bend_table", "moved")
 
 
 @cache
-def lines_with(*names: str) -> Packed:
-    """What makes lines of any number of cells that have optional fields of these names."""
+def lines_with(*names: str, **columns: int) -> Packed:
+    """What makes lines of any number of cells that have optional fields of these names; columns: where not as usual."""
 
     def one(n: int) -> Line:
-        more: dict[str, Any] = {name: blank(FIELDS[name]._replace(optional=False), n) for name in names}
+        wide = {name: FIELDS[name]._replace(optional=False) for name in names}
+        wide |= {name: FIELDS[name]._replace(optional=False, columns=x) for name, x in columns.items()}
+        more: dict[str, Any] = {name: blank(field, n) for name, field in wide.items()}
         return blank_line(n)._replace(**more)
 
     return Packed(one, given=OF_WHOLE_LINE)
 
 
 def lines_like(line: Line) -> Packed:
-    """What makes lines with the optional fields of this one, which has no layers that slip."""
-    return lines_with(*(name for name, field in FIELDS.items() if field.optional and getattr(line, name).size))
+    """What makes lines with the optional fields of this one."""
+    has = {name: getattr(line, name) for name, field in FIELDS.items() if field.optional}
+    return lines_with(**{name: x.shape[1] if x.ndim > 1 else 0 for name, x in has.items() if x.size})
 
 
 def of_whole_line(line: Line) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from hybrid.errors import SceneError, refuse_value
 from hybrid.kernels.reel.reel import LEAVES, Winch
 from hybrid.kernels.state.report import SOIL
 from hybrid.kernels.state.state import Floats, Line, slip_size
-from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
+from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of, torsion_zones
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Layout, LineOnBase, Zone
 from hybrid.model.sections import bending_stiffness, sleeves
@@ -144,22 +144,22 @@ class PayoutPlan:
 
         cable: as of `held_as`.
         """
-        return self._line_on(self.along(np.concatenate([self.nodes[:count], length - self.layer])), like, cable)
-
-    def whole_line(self, like: Line, cable: Material) -> Line:
-        """The line with all material nodes that there may be; like, cable: as of `line`."""
-        return self._line_on(self.along(self.nodes), like, cable)
-
-    def _line_on(self, s: Floats, like: Line, cable: Material) -> Line:
-        """The line with nodes s, m; like, cable: as of `line`."""
-        middle = 0.5 * (s[:-1] + s[1:])
-        ends = [zone.s_b for zone in self.zones]
-        rod = np.array([x.kind == "rod" for x in self.zones])
-        rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
+        s, rods = self._cells(count, length)
         line = line_on(cable, s, rods, like.bits & SOIL)
         flow = np.zeros((s.size if line.slip_law.size else 0, max(slip_size(line), 2)))
         like_it: dict[str, Any] = {"bits": like.bits, "plane": like.plane, "moved": like.moved, "slip_flow": flow}
         return line._replace(footing=self._footing(like, s.size), **like_it)
+
+    def torsion(self, count: int, length: float) -> Floats:
+        """Zones (K, 5) of that line, if they stay, that a torque passes through, as `Line.torsion`."""
+        s, rods = self._cells(count, length)
+        return torsion_zones(self.cable, np.diff(s), rods, self.cable.piece(0.5 * (s[:-1] + s[1:])))
+
+    def _cells(self, count: int, length: float) -> tuple[Floats, np.ndarray]:
+        """Nodes (N+1,) m of `count` material nodes and a length, m, and which cells (N,) are rod of zones that stay."""
+        s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
+        ends, rod = [zone.s_b for zone in self.zones], np.array([x.kind == "rod" for x in self.zones])
+        return s, rod[np.minimum(np.searchsorted(ends, 0.5 * (s[:-1] + s[1:])), len(ends) - 1)]
 
     def layout(self, count: int, length: float, rod: np.ndarray, here: np.ndarray | None = None) -> Layout:
         """The cells of `count` material nodes and a length, m, where zones move; rod, here: as of a Layout."""

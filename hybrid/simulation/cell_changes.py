@@ -87,7 +87,6 @@ class CellChanges(Remesh):
         now = Cells(layout.places, model.line.s, layout.base_of_cell, layout.rod_cells)
         self._cells = Given(now) if once else Room(layouts, most), Room(layouts, most)
         self._match = Room(matches, most)
-        self._torsion: Floats = model.line.torsion  # of the line after a change that is made once
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._shifts, self._places = np.array([not self.in_steps]), np.zeros(MOST_PLACES, np.int64)
 
@@ -115,10 +114,7 @@ class CellChanges(Remesh):
         if not (self._once and k):
             return whole
         cable = self.model.line_maker.cable_with(self.model.line.bits)
-        return whole | {"torsion": self._torsion, "law_table": cable.law_table, "bend_table": cable.bend_table}
-
-    def _turns(self, k: int) -> Floats:
-        return np.zeros((len(self._torsion), 3)) if self._once else super()._turns(k)
+        return whole | {"law_table": cable.law_table, "bend_table": cable.bend_table}
 
     def _zones_on(self, k: int, cells: int) -> z.Zones:
         zones = self._switching.zones

@@ -31,8 +31,7 @@ from hybrid.kernels.reel.payout_nodes import (
 )
 from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.report import REMEMBERS
-from hybrid.kernels.state.state import Batch, Line, Sea, State, state_for
+from hybrid.kernels.state.state import Batch, Line, Sea, State, slip_size, state_for
 from hybrid.model.build import Model
 from hybrid.model.line import lines_like, of_whole_line
 from hybrid.outputs.observation import Output
@@ -56,17 +55,17 @@ class NodeChanges(Remesh):
         paying, model = run.lines[number].paying, run.model.models[number]
         assert paying is not None
         self._paying = paying
-        plan, reel, twice, damped = self._paying.plan, self._paying.reel, self._paying.solves_twice, self._paying.damped
+        reel, twice, damped = self._paying.reel, self._paying.solves_twice, self._paying.damped
         extra = int((marks_on(model.line.s, run.lines[number].marked) != 0).sum())
         super().__init__(run, number, extra, twice, once)
+        slips = slip_size(model.line) // 2
         reels = Packed(
-            lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped), given=SHARED
+            lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped, slips), given=SHARED
         )
         self._reels = self._sides(reels, reel)
         # for what cells lack whose outputs wait; some MB, of which a run with few outputs touches little
         self._lacks = np.empty(0 if once else self.most_waiting * OF_REEL * (self.most + 1))
         self._line_table = Table(blank_line_job())
-        self._whole = model.line if once else plan.whole_line(model.line, plan.held_as(model.cable))
 
     def _key(self) -> tuple[Any, ...]:
         """What the tables hold as it is."""
@@ -79,7 +78,7 @@ class NodeChanges(Remesh):
         """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
         model, line = run.model.models[number], run.lines[number]
         stays = model.layout is None and line.paying is not None and not line.paying.ended
-        return stays and steps_alone(run, number) and is_plain(model.line)
+        return stays and steps_alone(run, number) and not model.line.torsion.size
 
     def change(self) -> None:
         """A node enters or leaves now."""
@@ -92,6 +91,14 @@ class NodeChanges(Remesh):
         carry: lets zones that move go on; the books of their line are of no use.
         """
         run, paying, model, state = self._run, self._paying, self.model, self.state(0, 0, 0)
+        if carry is None:
+            self._torsion = paying.plan.torsion(paying.count + (1 if paying.enters else -1), paying.length)
+            model.ends.at_time(run.t)
+            model.sea.at_time(run.t)
+            self.carry_out()
+            n, booked = self.cells, float(self._numbers[f.AFTER] - self._numbers[f.BEFORE])
+            model = self._model_of(self.line(1, n), self._sea_on(1, n))
+            return model, self.state(1, 0, n), self._books(1, n), booked
         old, new = paying.reel, paying.begin_change(model, run.t)
         line, out = new.model.line, state_for(new.model.line)
         self._lines, self._reels = (Given(model.line), Given(line)), (Given(old), Given(new.reel))
@@ -136,7 +143,7 @@ class NodeChanges(Remesh):
         around = model.ends.values, self._sea_on(to, m), self._work_on(to, m), self.state(to, 1, m)
         pushes = self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m)
         rest = self._width(m), self._itself.cells, *self._along, *self._moments, self._numbers, model.tension_scale
-        job = NodeJob(carry, self._whole, *(*around, before, self._books(to, m), *pushes, *rest))
+        job = NodeJob(carry, *(*around, before, self._books(to, m), *pushes, *rest))
         return job._asdict()
 
     def _parts(self) -> tuple[list[Bound], list[Part], int]:
@@ -175,16 +182,10 @@ class NodeChanges(Remesh):
         line = lines_like(model.line)(cells, **of_whole_line(model.line))
         reel = self._reel(1 - k, cells)
         reel.numbers[:] = paying.reel.numbers
-        self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)
+        self._line_table.bind(line=model.line, out=line, reel=reel, nodes=paying.plan.nodes)
         make_line(self._line_table.numbers)
         reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = self._lacks[begin:end].reshape(OF_REEL, cells)
         return paying.outputs_in(line, reel, batch), end
 
     def _outputs_now(self, batch: Batch) -> list[Output]:
         return self._paying.outputs_of_now(self.model.line, batch)
-
-
-def is_plain(line: Line) -> bool:
-    """Whether a line has nothing that a node which enters or leaves would have to carry in Python."""
-    laws = "torsion", "tension_twist", "law", "slip_law", "wake_law", "moved"
-    return not any(getattr(line, name).size for name in laws) and not line.bits & REMEMBERS

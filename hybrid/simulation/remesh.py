@@ -293,6 +293,7 @@ class Remesh:
         self._once, self.most = once, run.model.models[number].most_cells
         self._fixed_to, most = self._key(), self.most
         line, sea, state = self.model.line, self.model.sea.values, run.state.lines[number]
+        self._torsion: Floats = line.torsion  # of the line after a change that is made once
         self._lines = self._sides(lines_like(line), line)
         of_states = states_with(*memory_of(line))
         pairs = [self._sides(of_states, state) for _ in range(2)]
@@ -406,13 +407,13 @@ class Remesh:
         state: State = self._states[k][which].view(cells, turn=self._turns(k))
         return state
 
-    def _shared(self, _: int) -> dict[str, Any]:
-        """What the line of a side has as a whole, by name."""
-        return of_whole_line(self.model.line)
+    def _shared(self, k: int) -> dict[str, Any]:
+        """What the line of side k has as a whole, by name."""
+        return of_whole_line(self.model.line) | ({"torsion": self._torsion} if self._once and k else {})
 
     def _turns(self, _: int) -> Floats:
         """Of its zones that a torque passes through."""
-        return NO_TURN
+        return np.zeros((len(self._torsion), 3)) if self._once else NO_TURN
 
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
@@ -512,7 +513,8 @@ class Remesh:
         (_, plan, _), planners, _ = self._planner()
         bound, parts, begun = self._parts()
         at, n = self._at, self.model.cells
-        at.cells, at.next_cells = n, plan(planners[0].numbers)
+        at.cells = n
+        at.next_cells = plan(planners[0].numbers)
         tables = [Table(x.blank) for x in bound]
         for table, x in zip(tables, bound, strict=True):
             table.bind(**x.values(*(0, 0)[: 1 + x.by_parity], n, int(at.next_cells)))

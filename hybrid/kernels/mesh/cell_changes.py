@@ -189,7 +189,12 @@ def copy_state(state, out):
         for j in range(3):
             out.r[i, j], out.v[i, j], out.a[i, j] = state.r[i, j], state.v[i, j], state.a[i, j]
             out.vd[i, j], out.slip[i, j], out.bed[i, j] = state.vd[i, j], state.slip[i, j], state.bed[i, j]
-    for one, other in ((state.soil, out.soil), (state.wake, out.wake), (state.grip, out.grip)):
+    for one, other in (
+        (state.soil, out.soil),
+        (state.wake, out.wake),
+        (state.grip, out.grip),
+        (state.layers, out.layers),
+    ):
         for i in range(other.shape[0]):
             for j in range(other.shape[1]):
                 other[i, j] = one[i, j]

@@ -274,12 +274,12 @@ def _table(names: Iterable[str]) -> NDArray[np.int64]:
 
 
 def _numbers(of_node: bool) -> NDArray[np.int64]:
-    """Of fields of float64 of nodes, or of cells: where in the table of a line, and columns."""
+    """Of fields of float64 of nodes, or of cells: where in the table of a line, and columns; slips have any number."""
 
-    def wanted(field: Field) -> bool:
-        return field.of_node == of_node and field.kind is np.float64
+    def wanted(name: str, field: Field) -> bool:
+        return field.of_node == of_node and field.kind is np.float64 and not name.startswith("slip")
 
-    return np.array([(_at[x], max(y.columns, 1)) for x, y in FIELDS.items() if wanted(y)], np.int64)
+    return np.array([(_at[x], max(y.columns, 1)) for x, y in FIELDS.items() if wanted(x, y)], np.int64)
 
 
 CELLS = _table(x for x in PER_LENGTH if not FIELDS[x].of_node)
@@ -356,6 +356,9 @@ def copy_node(line, i, out, j):
     """Node i of a line as node j of another one."""
     copy_items(line, i, out, j, OF_NODES)
     out.element[j] = line.element[i]
+    for x, y in ((line.slip_law, out.slip_law), (line.slip_now, out.slip_now), (line.slip_flow, out.slip_flow)):
+        for column in range(y.shape[1] if y.shape[0] > 0 else 0):
+            y[j, column] = x[i, column]
 
 
 @inner

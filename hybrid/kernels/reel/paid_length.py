@@ -187,6 +187,34 @@ def fill_between(line, reel, i, a, ha, b, hb):
 
 
 @inner
+def fill_next(line, reel, k, a, before, b, begin, end):
+    """Node k behind a cell of row a and length `before`, and cell k between two places, of row b; the length of this."""
+    made, h, c = reel.made, end - begin, cell(line, reel, k)
+    made_between(reel.pieces, begin, end, made, b)
+    reel.true[k] = h
+    line.s[node(line, reel, k + 1)] = reel.numbers.far + reel.numbers.side * end
+    fill_between(line, reel, node(line, reel, k), a, before, b, h)
+    ck = line.ck[c]
+    fill_cell(line, c, made, b, h)
+    if has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
+        line.ck[c] = ck
+    if couples(line) and line.tension_torque[c] != 0.0:
+        line.tension_twist[c] = 0.5 * h * line.tension_torque[c] / made[b, B_1 + 2]
+    return h
+
+
+@inner
+def complete(line, reel, nodes, first, last):
+    """Cells from `first` on and before `last`, and their nodes, have all their material; nodes: (M,) m, places."""
+    a, b, before = 0, 1, nodes[first] - nodes[first - 1]
+    made_between(reel.pieces, nodes[first - 1], nodes[first], reel.made, a)
+    for k in range(first, last):
+        before = fill_next(line, reel, k, a, before, b, nodes[k], nodes[k + 1])
+        line.h[cell(line, reel, k)] = before
+        a, b = b, a
+
+
+@inner
 def fill_cells(line, reel):
     """Mass, loads and stiffness of the cell that grows, of those behind it and of their nodes, for the length that is out."""
     n, layer, made, a, b = line.h.shape[0], reel.layer, reel.made, 0, 1
@@ -195,18 +223,8 @@ def fill_cells(line, reel):
         made[a, j] = reel.rest[0, j]
     for k in range(g, n):
         end = length - layer[k - g]
-        h, c, i = end - begin, cell(line, reel, k), node(line, reel, k)
-        made_between(reel.pieces, begin, end, made, b)
-        reel.true[k] = h
-        line.s[node(line, reel, k + 1)] = reel.numbers.far + reel.numbers.side * end
-        fill_between(line, reel, i, a, before, b, h)
-        ck = line.ck[c]
-        fill_cell(line, c, made, b, h)
-        if has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
-            line.ck[c] = ck
-        if couples(line) and line.tension_torque[c] != 0.0:
-            line.tension_twist[c] = 0.5 * h * line.tension_torque[c] / made[b, B_1 + 2]
-        a, b, before, begin = b, a, h, end
+        before = fill_next(line, reel, k, a, before, b, begin, end)
+        a, b, begin = b, a, end
     i = node(line, reel, n)
     fill_between(line, reel, i, a, before, b, 0.0)
     if line.element[i] and reel.numbers.spring < np.inf:

@@ -19,14 +19,27 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import has_law, strain_and_energy_at
 from hybrid.kernels.laws.seabed import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
+from hybrid.kernels.laws.water import OFFSET, PHASE
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
 from hybrid.kernels.march.energies import Observed
 from hybrid.kernels.mesh.cell_changes import begin_anew, energy_in
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, copy_cell, copy_node, move_line
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, move_line
 from hybrid.kernels.mesh.zone_transfer import put3
-from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node, piece_at, place_of, prepare
+from hybrid.kernels.reel.paid_length import (
+    carry_layers,
+    cell,
+    complete,
+    growing,
+    lack_rate,
+    length_at,
+    made_between,
+    node,
+    piece_at,
+    place_of,
+    prepare,
+)
 from hybrid.kernels.reel.payout import chord_at, left_behind, way_at
 from hybrid.kernels.reel.payout_work import put_travels, strain_at
 from hybrid.kernels.reel.reel import ENTERS, FEWEST_STEPS, LEAVES, Reel, Winch, at_its_end
@@ -298,6 +311,14 @@ def span_of(job, flow, g):
 
 
 @inner
+def shed_between(wake, at, before, behind, part):
+    """Vortices at a new node are between those of its neighbours; more than half a turn apart: those of the one before."""
+    if abs(wake[before, PHASE] - wake[behind, PHASE]) < math.pi:
+        for j in range(wake.shape[1]):
+            wake[at, j] = (1.0 - part) * wake[before, j] + part * wake[behind, j]
+
+
+@inner
 def enter(job, flow, g):
     """One more node, in the cell that grows."""
     line, target, state, out, reel, new = job.line, job.target, job.state, job.out, job.reel, job.new
@@ -332,6 +353,8 @@ def enter(job, flow, g):
     put_travels(state, out, at, before, behind, part)
     if state.soil.shape[0] > 0:
         remember_between(state.soil, out.soil, at, before, behind, part)
+    if state.wake.shape[0] > 0:
+        shed_between(out.wake, at, node(target, new, g), node(target, new, i + 1), part)
     cut, last = cell(line, reel, g), cell(line, reel, g - 1)
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
     kept, rises = mismatch(job, flow, g, g), tension_rate(line, state, job.clock, job.tension, cut)
@@ -404,6 +427,8 @@ def carry_node(table):
         enter(job, flow, g)
     else:
         leave(job, flow, g)
+    if job.out.layers.shape[0] > 0:
+        carry_layers(line, job.target, job.state, job.out, reel, new)
     plain = (
         line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0
     )  # no force that payout_balance does not know
@@ -418,7 +443,6 @@ class NodeJob(NamedTuple):
     """One node more or less: what a run has before and after it, in two sets of arrays."""
 
     carry: CarryJob
-    whole: Line  # with all material nodes that there may be
     ends: Ends
     sea: Sea  # of the new cells, as all that follows
     work: Work
@@ -449,25 +473,39 @@ read_node = reader(blank_node_job())
 
 
 @inner
-def complete(whole, line, reel, k):
-    """Node and cell k have all their material."""
-    copy_node(whole, node(whole, reel, k), line, node(line, reel, k))
-    copy_cell(whole, cell(whole, reel, k), line, cell(line, reel, k))
-
-
-@inner
-def line_as(line, whole, out, reel):
-    """The same line in another number of cells, its length still to be given to it."""
+def line_as(line, out, reel, nodes):
+    """The same line in another number of cells, its length still to be given to it; what comes is made as on the reel."""
     n, m, rides = line.h.shape[0], out.h.shape[0], reel.layer.shape[0]
     g, grows = n - rides, m - rides
     move_line(line, out, reel.numbers.side > 0.0, min(g, grows) + 1, m - n)
-    for k in range(g, grows):
-        complete(whole, out, reel, k)
-    if grows > g:
-        out.s[node(out, reel, grows)] = whole.s[node(whole, reel, grows)]
+    complete(out, reel, nodes, g, grows)
     for k in range(grows, m + 1):
         i = node(out, reel, k)
         out.force[i, 0], out.force[i, 1] = 0.0, 0.0  # what rounding leaves of those on nodes that ride
+
+
+@inner
+def go_round(line, reel, first):
+    """Phases of vortices (kernels.laws.water) go on along the line at its nodes from `first` on."""
+    law, a, b = line.wake_law, node(line, reel, 0), node(line, reel, 1)
+    rate = (law[b, OFFSET] - law[a, OFFSET]) / (line.s[b] - line.s[a])
+    for k in range(first, line.h.shape[0] + 1):
+        i = node(line, reel, k)
+        law[i, OFFSET] = law[a, OFFSET] + rate * (line.s[i] - line.s[a])
+
+
+@inner
+def lie_wide(line, reel, widths, first):
+    """Diameters, m, with which nodes from `first` on lie in soil: between those of their cells, of the pieces here."""
+    n = line.h.shape[0]
+    for k in range(first, n + 1):
+        i, c = node(line, reel, k), cell(line, reel, k - 1)
+        one, before, after = widths[piece_at(reel, 0.5 * (line.s[c] + line.s[c + 1]))], reel.true[k - 1], 0.0
+        other = one
+        if k < n:
+            c, after = cell(line, reel, k), reel.true[k]
+            other = widths[piece_at(reel, 0.5 * (line.s[c] + line.s[c + 1]))]
+        line.bed_width[i] = one + after / (before + after) * (other - one)
 
 
 @inner
@@ -527,13 +565,18 @@ def energy_of(line, sea, ends, state, moment, strain, parts):
 def change_line(table):
     """One node more, or less, at the fairlead: the line and its reel."""
     job = read_node(table).carry
-    reel, new = job.reel, job.new
+    reel, new, target = job.reel, job.new, job.target
     for k in range(reel.numbers.plain.shape[0]):
         new.numbers.plain[k] = reel.numbers.plain[k]
     new.stage.riding_on, new.stage.balance_on, new.stage.flow_known, new.numbers.due = 0.0, 0.0, 0.0, 0.0
-    place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
-    line_as(job.line, read_node(table).whole, job.target, new)
-    prepare(job.target, new, job.clock.now)  # what new cells lack goes by what they are made of
+    place_reel(new, job.nodes, target.h.shape[0] - reel.layer.shape[0] + 1)
+    line_as(job.line, target, new, job.nodes)
+    prepare(target, new, job.clock.now)  # what new cells lack goes by what they are made of
+    first = growing(job.line, reel)
+    if target.wake_law.shape[0] > 0:
+        go_round(target, new, first)
+    if target.bed_width.shape[0] > 0:
+        lie_wide(target, new, read_node(table).widths, first)
 
 
 @kernel
@@ -568,7 +611,6 @@ class LineJob(NamedTuple):
     """A line, and the same of another length (written), whose places are put into its reel."""
 
     line: Line
-    whole: Line  # with all material nodes that there may be
     out: Line
     reel: Reel  # of `out`
     nodes: Floats  # (M,) m
@@ -583,7 +625,7 @@ def make_line(table):
     """`line_as`, and its reel."""
     job = read_line(table)
     place_reel(job.reel, job.nodes, job.out.h.shape[0] - job.reel.layer.shape[0] + 1)
-    line_as(job.line, job.whole, job.out, job.reel)
+    line_as(job.line, job.out, job.reel, job.nodes)
 
 
 # --- the planner ----------------------------------------------------------------------------------
