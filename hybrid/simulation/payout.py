@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.laws.axial_law import SHIFT
-from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel.paid_length import length_at
 from hybrid.kernels.reel.payout import end_payout, fit_line, lengthen, put_forces_on, remove_forces
@@ -36,15 +34,6 @@ OF_CELLS = ("lack", "rate", "since", "span")
 OF_EARLIER_VERSIONS = 10, 12, 13, 15  # numbers of a reel in checkpoints of those
 ROUND_OFF = 1e-9  # of the length: places of nodes are no nearer to what they were meant to be
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
-
-
-class OtherNodes(NamedTuple):
-    """A line with one node more, or less, at the fairlead."""
-
-    model: Model
-    reel: Reel
-    source: np.ndarray  # (N,) which old cell each of its cells comes from
-    of_base: np.ndarray  # (n,) likewise of base cells
 
 
 class PayingOut:
@@ -224,48 +213,19 @@ class PayingOut:
         winch = self.winch
         return self.holds_tension and not winch.least <= winch.length_now <= winch.most
 
-    def begin_change(self, model: Model, t: float) -> OtherNodes:
-        """The line with one node more, or less, at the fairlead at t (s), before it has a state."""
-        plan, more = self.plan, 1 if self.enters else -1
-        source = of_base = self._came_from(self.enters, self.reel.true.size)
-        old = model.line
-        if model.layout is not None:
-            of_base = self._came_from(self.enters, model.layout.rod.size)
-            parts = plan.parts_of(self.count + more)
-            here = on_other_parts(model.layout, model.layout.node_flags, of_base, parts) if plan.follows else None
-            model = replace(model, layout=model.layout._replace(rod=model.layout.rod[of_base], parts=parts, here=here))
-        self.count, material = self.count + more, self.material + more
-        model = self.on(model, self.length)
-        if model.layout is not None:
-            self.nodes = plan.nodes_of(model.layout)
-        if old.law.size:  # laws as the last step has linearised them
-            model.line.ck[:], model.line.law[:, SHIFT:] = old.ck[source], old.law[source, SHIFT:]
-        reel = self._blank(material)
-        self._fit(model.line, reel, self.length, t)  # what new cells lack goes by what they are made of
-        return OtherNodes(model, reel, source, of_base)
+    def other_base(self, layout: Layout) -> tuple[Layout, np.ndarray]:
+        """The layout with the node that is due more, or less; (n,) which base cells of before its base cells are."""
+        plan, source = self.plan, self._came_from(self.enters, layout.rod.size)
+        count = source.size - self.rides
+        here = on_other_parts(layout, layout.node_flags, source, plan.parts_of(count)) if plan.follows else None
+        return plan.layout(count, self.length, layout.rod[source], here), source
 
-    def end_change(self, new: OtherNodes, s: Floats, state: State, out: State, t: float) -> None:
-        """The line goes on with other nodes at t (s), to which its state has been carried; s: m, nodes of before."""
-        if out.wake.size and out.wake.shape > state.wake.shape:
-            self._blend_phases(s, out)
-        grows = new.reel.true.size - self.rides - 1
-        new.reel.true[grows] = self.length - self.plan.layer[0] - self.plan.nodes[self.count - 1]
-        self.reel = new.reel
-        self._fit(new.model.line, new.reel, self.length, t)
-
-    def _blend_phases(self, s: Floats, out: State) -> None:
-        """Vortices at a node that has just entered (out: written) are between those of its neighbours.
-
-        s: m, nodes of before.  Where these are more than half a turn apart it has those of the material beside it.
-        """
-        i = self.count - 1 if self.plan.side else len(out.wake) - self.count
-        far, near = (i - 1, i) if self.plan.side else (i, i - 1)  # nodes of before
-        step = 1 if self.plan.side else -1
-        one, other = out.wake[i - step], out.wake[i + step]
-        if abs(one[PHASE] - other[PHASE]) < np.pi:
-            there = self.plan.along(self.plan.nodes[: self.count])[-1 if self.plan.side else 0]
-            part = (there - s[far]) / (s[near] - s[far])
-            out.wake[i] = (1.0 - part) * one + part * other
+    def use_reel(self, reel: Reel, layout: Layout | None) -> None:
+        """Go on with a reel of other nodes; layout: of a line whose zones move."""
+        self.reel = reel
+        self.count = (reel.true.size if layout is None else layout.rod.size) - self.rides
+        if layout is not None:
+            self.nodes = self.plan.nodes_of(layout)
 
     @property
     def enters(self) -> bool:
@@ -273,7 +233,7 @@ class PayingOut:
         return bool(self.reel.true[self.material - 1] > self.reel.numbers.longest)
 
     def _came_from(self, enters: bool, cells: int) -> np.ndarray:
-        """Which of so many old cells, or base cells, those come from of a line that a node enters, or leaves."""
+        """Which of so many old base cells those come from of a line that a node enters, or leaves."""
         grows, all_ = cells - self.plan.layer.size, np.arange(cells)
         source = np.insert(all_, grows, grows) if enters else np.delete(all_, grows - 1)
         return source if self.plan.side else cells - 1 - source[::-1]

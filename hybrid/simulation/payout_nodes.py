@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import remesh as f
-from hybrid.kernels.reel.paid_length import carry_layers
+from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.reel.payout import stand_still
 from hybrid.kernels.reel.payout_nodes import (
     OF_REEL,
@@ -19,8 +19,10 @@ from hybrid.kernels.reel.payout_nodes import (
     blank_line_job,
     blank_node_job,
     blank_node_planner,
+    blank_zones_job,
     book_change,
     carry_node,
+    carry_zones,
     change_line,
     fit_changed,
     keep_reel,
@@ -31,18 +33,23 @@ from hybrid.kernels.reel.payout_nodes import (
 )
 from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.state import Batch, Line, Sea, State, slip_size, state_for
+from hybrid.kernels.state.state import Batch, Line, Sea, State, slip_size
 from hybrid.model.build import Model
 from hybrid.model.line import lines_like, of_whole_line
+from hybrid.model.mesh import LineOnBase
 from hybrid.outputs.observation import Output
-from hybrid.simulation.remesh import Bound, Given, OfRun, Part, Remesh, copy_fields, steps_alone
+from hybrid.simulation.remesh import Bound, OfRun, Part, Remesh, copy_fields, steps_alone
 from hybrid.simulation.result_file import marks_on
 
 SHARED = ("law", "pieces", "winch", "layer")  # what all reels of a line have in common
 
 
-# With a model: which old cell (N,) each of its cells comes from, and base cell (n,).
-Carry = Callable[[Model, np.ndarray, np.ndarray], None]
+class PaidBase(Protocol):
+    """Zones of a line that is paid out (simulation.run_payout.PaidZones)."""
+
+    @property
+    def zones(self) -> Zones: ...
+    def use_base(self, model: Model, source: np.ndarray) -> None: ...
 
 
 class NodeChanges(Remesh):
@@ -63,6 +70,8 @@ class NodeChanges(Remesh):
             lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice, damped, slips), given=SHARED
         )
         self._reels = self._sides(reels, reel)
+        self._zones: tuple[Zones, Zones] | None = None  # that move, of a change that is made once, before and after it
+        self._layout, self._on_base = model.layout, model.on_base
         # for what cells lack whose outputs wait; some MB, of which a run with few outputs touches little
         self._lacks = np.empty(0 if once else self.most_waiting * OF_REEL * (self.most + 1))
         self._line_table = Table(blank_line_job())
@@ -85,40 +94,26 @@ class NodeChanges(Remesh):
         f.change_cells(self._table.numbers)
         self.sync()
 
-    def change_once(self, carry: Carry | None) -> tuple[Model, State, Books, float]:
+    def change_once(self, zones: PaidBase | None) -> tuple[Model, State, Books, float]:
         """A node enters or leaves in arrays of their own: the line, its state and books, and the energy, J, of that.
 
-        carry: lets zones that move go on; the books of their line are of no use.
+        zones: that move, which go on; the books of their line are of no use.
         """
-        run, paying, model, state = self._run, self._paying, self.model, self.state(0, 0, 0)
-        if carry is None:
+        run, paying, model = self._run, self._paying, self.model
+        if zones is None:
             self._torsion = paying.plan.torsion(paying.count + (1 if paying.enters else -1), paying.length)
-            model.ends.at_time(run.t)
-            model.sea.at_time(run.t)
-            self.carry_out()
-            n, booked = self.cells, float(self._numbers[f.AFTER] - self._numbers[f.BEFORE])
-            model = self._model_of(self.line(1, n), self._sea_on(1, n))
-            return model, self.state(1, 0, n), self._books(1, n), booked
-        old, new = paying.reel, paying.begin_change(model, run.t)
-        line, out = new.model.line, state_for(new.model.line)
-        self._lines, self._reels = (Given(model.line), Given(line)), (Given(old), Given(new.reel))
-        self._states[1], self._base[:] = (Given(out), Given(out)), self._line.books.base
+        else:
+            self._layout, source = paying.other_base(model.zoned)
+            self._on_base = LineOnBase(paying.plan.held_as(model.cable), self._layout.base)
+            self._torsion, before = self._on_base.torsion(self._layout), zones.zones
+            zones.use_base(replace(model, layout=self._layout, on_base=self._on_base), source)
+            self._zones = before, zones.zones
         model.ends.at_time(run.t)
         model.sea.at_time(run.t)
-        job = Table(blank_node_job)
-        self._parts()
-        job.bind(**self._node_job(0, 0, model.cells, new.model.cells))
-        carry_node(job.numbers)
-        if out.layers.size:
-            carry_layers(model.line, line, state, out, old, new.reel)
-        paying.end_change(new, model.line.s, state, out, run.t)
-        if carry is not None:
-            carry(new.model, new.source, new.of_base)
-        else:
-            renew_run(job.numbers)
-        book_change(job.numbers)
-        booked = float(self._numbers[f.AFTER] - self._numbers[f.BEFORE])
-        return new.model, out, self._books(1, new.model.cells), booked
+        self.carry_out()
+        n, booked = self.cells, float(self._numbers[f.AFTER] - self._numbers[f.BEFORE])
+        model = self._model_of(self.line(1, n), self._sea_on(1, n))
+        return model, self.state(1, 0, n), self._books(1, n), booked
 
     # --- tables -------------------------------------------------------------------------------------
 
@@ -146,6 +141,12 @@ class NodeChanges(Remesh):
         job = NodeJob(carry, *(*around, before, self._books(to, m), *pushes, *rest))
         return job._asdict()
 
+    def _zones_job(self, k: int, _: int, n: int, m: int) -> dict[str, Any]:
+        assert self._zones is not None
+        before, after = self._zones
+        lines = {"line": self.line(k, n), "target": self.line(1 - k, m)}
+        return lines | {"reel": self._reel(1 - k, m), "zones": before, "out": after}
+
     def _parts(self) -> tuple[list[Bound], list[Part], int]:
         envelope, plan, most = self._line.envelope, self._paying.plan, self.most + 2
         way = slice(None, None, 1 if plan.side else -1)
@@ -154,8 +155,12 @@ class NodeChanges(Remesh):
         self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
         # the table of `carry_node` begins that of the others
         parts = [Part(x, 0) for x in (change_line, carry_node, fit_changed, book_change, renew_run)]
+        bound = [Bound(blank_node_job, self._node_job)]
+        if self._zones is not None:
+            parts[3:] = [Part(carry_zones, 1), Part(book_change, 0)]
+            bound.append(Bound(blank_zones_job, self._zones_job))
         self._calls.stand = stand_still.address(self._paying.table.numbers)
-        return [Bound(blank_node_job, self._node_job)], parts, 2
+        return bound, parts, 2
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
         tables = []
@@ -170,9 +175,10 @@ class NodeChanges(Remesh):
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
         model, paying, length = self.model, self._paying, float(line.s[-1] - line.s[0])
-        paying.count, paying.reel = self.cells - paying.rides, self._reel(self.side, self.cells)
-        zones = paying.plan.zones_of(length)
-        return replace(model, line=line, zones=zones, sea=model.sea.with_values(sea), length=length)
+        paying.use_reel(self._reel(self.side, self.cells), self._layout)
+        zones = paying.plan.zones_of(length) if self._layout is None else self._layout.zones
+        model = replace(model, line=line, zones=zones, sea=model.sea.with_values(sea), length=length)
+        return replace(model, layout=self._layout, on_base=self._on_base)
 
     # --- outputs that wait --------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.water import PHASE
-from hybrid.kernels.mesh.zone_criteria import soften
+from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.reel.payout import iterate, iterate_with_others, limit_next_step, pay_out, stand_among, stand_still
 from hybrid.kernels.reel.reel import MovingZones, ReelJob, zones_that_stay
 from hybrid.kernels.state import books as b
@@ -33,7 +33,7 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState
-from hybrid.zones.change import ZoneSwitching, change_base, rods_at_winch
+from hybrid.zones.change import ZoneSwitching, rods_at_winch
 from hybrid.zones.manager import Change, DomainManager, Reason
 
 # Nodes by which cells are merged before the one leaves at which they must be whole: merged then, where the reel still
@@ -120,37 +120,39 @@ class PaidZones:
         zones.true[changing] = model.line.h[changing]
         return model
 
-    def carry(self, model: Model, source: np.ndarray, of_base: np.ndarray) -> None:
-        """A node has entered or left: `model` has the cells of now.
+    @property
+    def zones(self) -> Zones:
+        """What the compiled run knows of them."""
+        return self.switching.zones
 
-        source, of_base: which old cells (N,), and base cells (n,), they were.
+    def use_base(self, model: Model, source: np.ndarray) -> None:
+        """A node enters or leaves: the base cells are those of a model, whose line is still to be made.
+
+        source: (n,) which base cells they were.
         """
-        switching, zones = self.switching, self.switching.zones
-        lengths, true, line = zones.lengths[source], zones.true[source], model.line
-        self.paying.foreseen = self.paying.fastest
-        self._change_base(model, of_base, source)
-        kept = ~self.paying.changing
-        line.h[kept] = lengths[kept]
-        switching.zones.lengths[:], switching.zones.true[kept] = line.h, true[kept]
-        near = self.paying.plan.at_winch(self.paying.count, 0.0)
-        self.manager.grown[near], self.manager.leaving[near] = 1.0, False
-        soften(self.manager.stiffness_shares(), switching.zones.stiff, line.kb)
+        paying, manager = self.paying, self.manager
+        paying.foreseen = paying.fastest
+        known, relaxing = manager.zones.counts.known, manager.zones.counts.relaxing
+        ages = manager.zones.clock.age, manager.zones.clock.recent_age
+        self._use_base(model, source)
+        near, zones = paying.plan.at_winch(source.size - paying.rides, 0.0), manager.zones
+        zones.grown[near], zones.leaving[near] = 1.0, False
+        zones.counts.known, zones.counts.relaxing = known, relaxing
+        zones.clock.age, zones.clock.recent_age = ages
 
     def resume(self, model: Model) -> None:
         """Go on with the cells of a checkpoint, from which all else follows (ZoneSwitching.restore)."""
-        old = self.manager.layout
-        base, cells = np.arange(model.zoned.rod.size), np.arange(model.cells)
-        self._change_base(
-            model, np.minimum(base, old.rod.size - 1), np.minimum(cells, old.base_of_cell.size - 1), anew=True
-        )
+        n = self.manager.layout.rod.size
+        self._use_base(model, np.minimum(np.arange(model.zoned.rod.size), n - 1), anew=True)
+        self.switching.use_base(model)
+        self.switching.set_cells(model.line)
 
-    def _change_base(self, model: Model, source: np.ndarray, cells: np.ndarray, anew: bool = False) -> None:
-        paying, manager = self.paying, self.manager
-        given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.ramp_time, paying.foreseen)
+    def _use_base(self, model: Model, source: np.ndarray, anew: bool = False) -> None:
+        paying, manager, count = self.paying, self.manager, source.size - self.paying.rides
+        given = rods_at_winch(self.scene, paying.plan, model, count, manager.ramp_time, paying.foreseen)
         given[[0, -1]] = np.where(self._turning, 1, given[[0, -1]])
         manager.cable = paying.plan.held_as(model.cable)
-        change_base(manager, model, source, cells, given, anew)
-        self.switching.set_cells(model)
+        manager.use_base(model.zoned, model.line_maker, source, given, anew)
 
 
 class RunPayout(Part):
@@ -318,8 +320,9 @@ class RunPayout(Part):
             states = [*run.state.lines]
         if zones is not None:
             zones.hand_over(run.t, states[k])
-        carry = zones.carry if zones is not None else None
-        model, states[k], books, booked = NodeChanges(run, k, once=True).change_once(carry)
+        model, states[k], books, booked = NodeChanges(run, k, once=True).change_once(zones)
+        if zones is not None:
+            zones.switching.use_base(model)
         if line.contact is not None or line.shares:  # whose forces kernels.reel.paid_length does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked

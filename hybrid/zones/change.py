@@ -20,12 +20,12 @@ from hybrid.kernels.march.zone_torque import carry_torque
 from hybrid.kernels.mesh.cell_lengths import IDLE_STEPS
 from hybrid.kernels.mesh.zone_criteria import CRITERIA
 from hybrid.kernels.mesh.zone_plan import blank_review_job, quiet_review
-from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, plan_nodes, read_arcs
+from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, plan_nodes, read_arcs
 from hybrid.kernels.state.report import PLANAR
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model, given_zones
 from hybrid.model.material import nodes_at
-from hybrid.model.mesh import Layout, edges, on_other_parts
+from hybrid.model.mesh import Layout, edges
 from hybrid.model.nearby import FEWER, MANY, picked
 from hybrid.model.payout import PayoutPlan, fastest
 from hybrid.model.resolution import Resolution, follows_curvature
@@ -34,7 +34,7 @@ from hybrid.scene.motion_checks import longest_period
 from hybrid.scene.schema import LineScene
 from hybrid.solve.stepper import NetworkTaken
 from hybrid.store.integrity import matched
-from hybrid.zones.manager import OF_BASE, OF_LINE, Allowed, Change, DomainManager, Times, UserCriterion, shares_asked
+from hybrid.zones.manager import Allowed, Change, DomainManager, Times, UserCriterion, shares_asked
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many ramp times.
 LETTING_GO = 1.0
@@ -62,23 +62,19 @@ class ZoneSwitching:
         self._plan_table = Table(blank_zone_job)
         self._review = Table(blank_review_job)
         self.guided = np.array(model.cable.held_tangent, float)
-        base = manager.layout.base
-        self.kinks = np.zeros(base.size, bool)
-        self.kinks[nodes_at(model.cable.at, base)] = True
-        self._set_line(model.line, model.line.h)
+        self.use_base(model)
+        self.set_cells(model.line)
 
-    def set_cells(self, model: Model) -> None:
-        """Go on with a model whose line has all of its stiffness and its true lengths: cells have come or gone."""
+    def use_base(self, model: Model) -> None:
+        """Go on with a model whose base cells may be others; zones know of its cells, or will."""
         self.model = model
         self.kinks = np.zeros(model.zoned.base.size, bool)
         self.kinks[nodes_at(model.cable.at, model.zoned.base)] = True
-        self._set_line(model.line, model.line.h)
-        self.zones.true[:] = np.diff(model.line.s)
 
-    def _set_line(self, line: Line, lengths: Floats) -> None:
-        """A line with all of its stiffness and its true lengths; lengths: (N,) m, that its cells have now."""
+    def set_cells(self, line: Line) -> None:
+        """The line has all of its stiffness, and cells whose true lengths are as long as they are apart."""
         zones = self.zones
-        zones.stiff[:], zones.true[:], zones.lengths[:] = line.kb, line.h, lengths
+        zones.stiff[:], zones.true[:], zones.lengths[:] = line.kb, np.diff(line.s), line.h
 
     @property
     def zones(self) -> Zones:
@@ -213,47 +209,6 @@ class ZoneSwitching:
         cable = self.model.cable
         held = np.array([cable.held_twist[k] and cable.held_tangent[k] for k in (0, 1)], bool)
         return ends.frame.reshape(2, 3, 3)[:, :, ::2].transpose(0, 2, 1).copy(), held
-
-
-# The base cells of a line change while it is paid out: what the domain manager remembers of those that stay.
-
-# Arrays of `Zones` that have base cells, and cells.
-CARRIED = ("leaving", "grown", "ramp_factor")
-OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
-
-
-def change_base(
-    manager: DomainManager, model: Model, source: np.ndarray, of_cell: np.ndarray, given: np.ndarray, anew: bool
-) -> None:
-    """Let a manager go on with base cells of which some have come or gone, where they are one cell each.
-
-    source, of_cell: which of the old base cells (n,), and cells (N,), a new one is, or has come from; given: (n,) 1
-    rod, -1 catenary, 0 adaptive; anew: for how many steps nodes could have gone is not known.
-    """
-    layout, on_base = model.zoned, model.line_maker
-    old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
-    idle = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.idle_steps, source, layout.parts)
-    waves = np.zeros(places) if anew else on_other_parts(manager.layout, old.waves, source, layout.parts)
-    blank = blank_zones(1, n)._replace(
-        here=np.zeros(places, bool), plan=np.zeros(places, bool), idle_steps=idle, waves=waves
-    )
-    kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
-    kept |= {name: getattr(old, name)[source] for name in CARRIED}
-    assert set(kept) <= set(OF_BASE)
-    cells = {name: getattr(old, name)[of_cell] for name in OF_CELLS}
-    known, relaxing = old.counts.known, old.counts.relaxing
-    age, recent_age = old.clock.age, old.clock.recent_age
-    manager.zones = blank._replace(**kept)
-    for name in ("below_since", "wait_factor", "released", "buffer"):
-        setattr(manager, name, getattr(manager, name)[source])
-    manager.release_cause, manager.seen = manager.release_cause[:, source].copy(), manager.seen[:, source].copy()
-    manager.given, manager.free, manager.on_base = given, (given >= 0).astype(np.int8), on_base
-    manager.measure(layout)
-    manager.set_layout(layout)
-    for name, x in cells.items():
-        getattr(manager.zones, name)[:] = x
-    manager.zones.counts.known, manager.zones.counts.relaxing = known, relaxing
-    old.clock.age, old.clock.recent_age = age, recent_age
 
 
 # --- at the start ------------------------------------------------------------------------------

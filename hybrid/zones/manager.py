@@ -37,7 +37,7 @@ from hybrid.kernels.mesh.zone_plan import (
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.material import Material, tension_floor
-from hybrid.model.mesh import Layout, LineOnBase, edges
+from hybrid.model.mesh import Layout, LineOnBase, edges, on_other_parts
 from hybrid.model.resolution import requested_accuracy
 from hybrid.scene.analysis import ROUGHEST
 from hybrid.scene.schema import LineScene
@@ -348,6 +348,30 @@ class DomainManager:
         clock.age = clock.recent_age = 0.0
         flags.known = flags.relaxing = flags.strained = 0
         flags.all_rod = bool(layout.rod.all())
+
+    def use_base(
+        self, layout: Layout, on_base: LineOnBase, source: np.ndarray, given: np.ndarray, anew: bool = False
+    ) -> None:
+        """Go on with base cells of which some have come or gone, where they are one cell each.
+
+        source: (n,) which old base cell a new one is, or has come from; given: as of the constructor; anew: for how
+        many steps nodes could have gone is not known.
+        """
+        old, n, places = self.zones, layout.rod.size, layout.starts[-1] + 1
+        blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool))
+        kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
+        kept |= {name: getattr(old, name)[source] for name in ("leaving", "grown", "ramp_factor")}
+        for name in ("idle_steps", "waves"):
+            x = getattr(old, name)
+            there = np.zeros(places, x.dtype) if anew else on_other_parts(self.layout, x, source, layout.parts)
+            kept[name] = there
+        self.zones = blank._replace(**kept)
+        for name in ("below_since", "wait_factor", "released", "buffer"):
+            setattr(self, name, getattr(self, name)[source])
+        self.release_cause, self.seen = self.release_cause[:, source].copy(), self.seen[:, source].copy()
+        self.given, self.free, self.on_base = given, (given >= 0).astype(np.int8), on_base
+        self.measure(layout)
+        self.set_layout(layout)
 
     def use_cells_of(self, layout: Layout, zones: Zones) -> None:
         """Go on with other cells of the same base, of which `zones` knows all."""

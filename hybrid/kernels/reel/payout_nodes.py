@@ -24,12 +24,14 @@ from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
 from hybrid.kernels.march.energies import Observed
-from hybrid.kernels.mesh.cell_changes import begin_anew, energy_in
+from hybrid.kernels.mesh.cell_changes import begin_anew, energy_in, make_stiffness
 from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, move_line
+from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.mesh.zone_transfer import put3
 from hybrid.kernels.reel.paid_length import (
     carry_layers,
     cell,
+    changes_length,
     complete,
     growing,
     lack_rate,
@@ -41,7 +43,7 @@ from hybrid.kernels.reel.paid_length import (
     prepare,
 )
 from hybrid.kernels.reel.payout import chord_at, left_behind, way_at
-from hybrid.kernels.reel.payout_work import put_travels, strain_at
+from hybrid.kernels.reel.payout_work import leave_to_reel, put_travels, strain_at
 from hybrid.kernels.reel.reel import ENTERS, FEWEST_STEPS, LEAVES, Reel, Winch, at_its_end
 from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
@@ -605,6 +607,43 @@ def renew_run(table):
     begin_anew(job, job.carry.out, line.s, target)
     renew_books(job, n, m, forward, min(n, m) - job.carry.new.layer.shape[0] + 1)
     clock.previous = clock.now
+
+
+class ZonesJob(NamedTuple):
+    """Zones that move, before a node enters or leaves and after it: of base cells they know already."""
+
+    line: Line
+    target: Line
+    reel: Reel  # of the new line
+    zones: Zones
+    out: Zones  # written
+
+
+blank_zones_job = blanks(ZonesJob)
+read_zones = reader(blank_zones_job())
+
+
+@kernel
+def carry_zones(table):
+    """What zones know of cells, on the new ones, whose elements are as stiff as ramps have them."""
+    job = read_zones(table)
+    zones, out, reel, n, m = job.zones, job.out, job.reel, job.line.h.shape[0], job.target.h.shape[0]
+    forward, step, cut = reel.numbers.side > 0.0, m - n, min(n, m) - reel.layer.shape[0]
+    for old, new in ((zones.past, out.past), (zones.recent, out.recent), (zones.lengths, out.lengths)):
+        move_row(old, new, forward, cut, step)
+    for old, new in ((zones.true, out.true), (zones.lack, out.lack), (zones.rate, out.rate), (zones.since, out.since)):
+        move_row(old, new, forward, cut, step)
+    move_row(zones.keeps, out.keeps, forward, cut, step)
+    move_rows(zones.stiff, out.stiff, forward, cut + 1, step)
+    for c in range(m):
+        if changes_length(job.target, reel, c):
+            out.true[c] = reel.true[cell(job.target, reel, c)]
+    for k in range(cut, m + 1):  # they have all of their stiffness, as those behind them
+        i = node(job.target, reel, k)
+        for j in range(3):
+            out.stiff[i, j] = job.target.kb[i, j]
+    leave_to_reel(job.target, out, reel)
+    make_stiffness(job.target, out)
 
 
 class LineJob(NamedTuple):
