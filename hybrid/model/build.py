@@ -236,13 +236,16 @@ class Model:
     @property
     def always(self) -> np.ndarray:
         """Numbers of nodes that there always are: those of base cells, or that cannot be taken in."""
-        if self.payout is not None:
-            stays = np.flatnonzero(self.payout.nodes <= self.payout.shortest - self.payout.layer[0])
-            if self.layout is None:
-                return stays if self.payout.side else self.cells - stays[::-1]
-            first = self.layout.first
-            return first[stays] if self.payout.side else first[first.size - 1 - stays[::-1]]
-        return np.arange(self.line.s.size) if self.layout is None else self.layout.first
+        return self.always_base if self.layout is None else self.layout.first[self.always_base]
+
+    @property
+    def always_base(self) -> np.ndarray:
+        """The same of base nodes; of a line whose zones stay all nodes are."""
+        nodes = self.line.s.size if self.layout is None else self.layout.base.size
+        if self.payout is None:
+            return np.arange(nodes)
+        stays = np.flatnonzero(self.payout.nodes <= self.payout.shortest - self.payout.layer[0])
+        return stays if self.payout.side else nodes - 1 - stays[::-1]
 
     @property
     def loaded_ends(self) -> tuple[bool, bool]:

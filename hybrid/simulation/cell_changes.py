@@ -23,7 +23,6 @@ from hybrid.kernels.mesh.cell_changes import (
     keep_places,
     plan_cells,
     renew,
-    renew_zones,
 )
 from hybrid.kernels.mesh.remesh import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match
@@ -87,6 +86,7 @@ class CellChanges(Remesh):
         now = Cells(layout.places, model.line.s, layout.base_of_cell, layout.rod_cells)
         self._cells = Given(now) if once else Room(layouts, most), Room(layouts, most)
         self._match = Room(matches, most)
+        self._by_nodes: tuple[Floats, Floats] | None = None  # nodes before and after by which extremes are kept, at a winch
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._shifts, self._places = np.array([not self.in_steps]), np.zeros(MOST_PLACES, np.int64)
 
@@ -164,7 +164,8 @@ class CellChanges(Remesh):
     def _renew_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
         to = 1 - k
         at, of_old = self._layout(to, m), self._layout(k, n)
-        found: dict[str, Any] = {"s": of_old.s, "rods": of_old.rods, "to_s": at.s, "to_rods": at.rods}
+        s, to_s = self._by_nodes or (of_old.s, at.s)
+        found: dict[str, Any] = {"s": s, "rods": of_old.rods, "to_s": to_s, "to_rods": at.rods}
         found |= {"line": self.line(to, m), "place": at.place, "of": at.of, "first": self._first[to]}
         found |= {"marked": self._marked, "nearest": self._itself.cells, "scale": self.model.tension_scale}
         found |= {"state": self.state(to, 0, m), "twin": self.state(to, 1, m), "sea": self._sea_on(to, m)}
@@ -179,6 +180,8 @@ class CellChanges(Remesh):
             "borne": 1.0 + model.cable.max_strain[self._piece],
             "widths": np.ascontiguousarray(model.cable.outer_diameter[self._piece]),
             "start": envelope.start,
+            "start_s": envelope.nodes,
+            "always": model.always_base,
             "envelope_s": envelope.s,
             "bounds": envelope.bounds,
             "stays": np.zeros(self.most + 1, np.int64),
@@ -192,7 +195,7 @@ class CellChanges(Remesh):
         ]
         parts = [Part(clear_state, RENEWED), Part(fill_line, LINE), Part(begin_switch, SWITCH)]
         parts += [Part(fill_kinds, KINDS), Part(end_switch, SWITCH)]
-        parts.append(Part(renew if self._line.paying is None else renew_zones, RENEWED))
+        parts.append(Part(renew, RENEWED))
         return tables, parts, 3
 
     def _planner(self) -> tuple[tuple[Any, Any, Any], list[Table], int]:
@@ -257,6 +260,8 @@ class CellChanges(Remesh):
             here = zones.plan.copy() if change.same else switching.plan(change.rod, sea, ends, state)
         layout = model.zoned._replace(rod=change.rod, here=here)
         zones.next_rod[:], zones.plan[:] = change.rod, layout.node_flags
+        if model.payout is not None:
+            self._by_nodes = model.nodes, model.payout.kept_nodes(layout)
         self._torsion, m = model.line_maker.torsion(layout), layout.base_of_cell.size
 
         def adopt() -> None:

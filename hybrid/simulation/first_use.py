@@ -41,6 +41,8 @@ ENERGIES = "march.energies.observe"
 TOUCHING_LINES = "junctions.lines_contact.touch_network", "junctions.lines_contact.shared_task"
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "mesh.remesh.change_cells"  # this one: the rest
 
+PAID_ZONES = "reel.payout_nodes.carry_zones"  # of lines whose zones move
+
 NO_TABLE = np.zeros(0, np.int64)  # of which only the type counts
 
 # A cable for the second process to compile with; nothing is computed of it.
@@ -78,7 +80,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     if scene.time is not None and scene.adaptive:
         found += [WEIGHED, *([CRITERIA] if static else [*ZONE_CHANGES, ZONES])]
     if not static and any(payout_of(x) is not None for x in lines.values()):
-        found += PAYOUT_OF_LINES
+        found += [*PAYOUT_OF_LINES, *([PAID_ZONES] if scene.adaptive else [])]
     if pairs or touch_themselves:
         found += TOUCHING_LINES
     if touch_themselves:
@@ -153,7 +155,7 @@ def compile_all(names: Sequence[str]) -> None:
     if PAYOUT_OF_LINES[2] in names:
         for kernel in payout_kernels():
             kernel.compile_unless_busy(NO_TABLE)
-    _compile_by_table(names, TOUCHING, *TOUCHING_LINES, *PAYOUT_OF_LINES[:2])
+    _compile_by_table(names, TOUCHING, *TOUCHING_LINES, *PAYOUT_OF_LINES[:2], PAID_ZONES)
     _compile_by_table(names, STEPS_OF_LINES, BOOKS_OF_LINES, REST_OF_LINES, START_OF_LINES, SOLVER[1])
 
 

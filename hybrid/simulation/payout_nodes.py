@@ -1,4 +1,4 @@
-"""Nodes that enter and leave at a winch: what changes them between two steps of a run, where zones stay."""
+"""Nodes that enter and leave at a winch: what changes them between two steps of a run."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class PaidBase(Protocol):
 
 
 class NodeChanges(Remesh):
-    """Nodes of a line of a run that enter and leave, where zones stay, with the solver that it has now."""
+    """Nodes of a line of a run that enter and leave at its winch."""
 
     beside, most_waiting, per_node = ("line", "sea", "old", "new", "report", "reel", "X", "W"), 512, OF_REEL
 
@@ -97,7 +97,7 @@ class NodeChanges(Remesh):
     def change_once(self, zones: PaidBase | None) -> tuple[Model, State, Books, float]:
         """A node enters or leaves in arrays of their own: the line, its state and books, and the energy, J, of that.
 
-        zones: that move, which go on; the books of their line are of no use.
+        zones: that move, which go on.
         """
         run, paying, model = self._run, self._paying, self.model
         if zones is None:
@@ -151,13 +151,15 @@ class NodeChanges(Remesh):
         envelope, plan, most = self._line.envelope, self._paying.plan, self.most + 2
         way = slice(None, None, 1 if plan.side else -1)
         borne = np.ascontiguousarray(1.0 + plan.cable.max_strain[way])
-        self._along = borne, np.ascontiguousarray(plan.cable.outer_diameter[way]), envelope.start, envelope.bounds
+        widths = np.ascontiguousarray(plan.cable.outer_diameter[way])
+        kept, gone = np.zeros(envelope.nodes.size), np.full(envelope.nodes.size, -1)
+        self._along = borne, widths, envelope.start, envelope.nodes, kept, envelope.s, envelope.bounds, gone
         self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
         # the table of `carry_node` begins that of the others
         parts = [Part(x, 0) for x in (change_line, carry_node, fit_changed, book_change, renew_run)]
         bound = [Bound(blank_node_job, self._node_job)]
         if self._zones is not None:
-            parts[3:] = [Part(carry_zones, 1), Part(book_change, 0)]
+            parts.insert(3, Part(carry_zones, 1))
             bound.append(Bound(blank_zones_job, self._zones_job))
         self._calls.stand = stand_still.address(self._paying.table.numbers)
         return bound, parts, 2

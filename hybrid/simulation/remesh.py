@@ -5,11 +5,11 @@ Changes need no help of Python's: they go to arrays with room for the most cells
 Two sets of arrays, the sides, take turns: a change goes from one to the other (kernels.mesh.remesh), and the tables
 of the run get the numbers of the other one.  What Python has of the line is made anew when the run comes back
 (`sync`). A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes
-at a winch, where zones stay (simulation.payout_nodes).
+at a winch (simulation.payout_nodes).
 
-Where more than steps and watches knows of the cells (lines that touch, torque through zones, winches with zones or
-laws) a change is made once, from what the run has to arrays of their own, and another solver follows: of cells by the
-same parts (`carry_out`); of nodes at a winch the plan of the payout fills the line, and zones there go on in Python.
+Where more than steps and watches knows of the cells (lines that touch, torque through zones, winches with zones) a
+change is made once, by the same parts (`carry_out`), from what the run has to arrays of their own, and another solver
+follows.
 """
 
 from __future__ import annotations

@@ -416,7 +416,7 @@ class Envelope:
         if moves and model.payout is not None:
             nodes = model.payout.finest
         marked = model.nodes[np.flatnonzero(marks_of(scene, model))]
-        self._nodes, self._marked = nodes, marked
+        self.nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
         self.start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
         self.begin = 0.0  # s
@@ -446,18 +446,13 @@ class Envelope:
 
     def count_from(self, model: Model, r: Floats) -> None:
         """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
-        s, at = model.line.s, np.clip(self._nodes, model.line.s[0], model.line.s[-1])
+        s, at = model.line.s, np.clip(self.nodes, model.line.s[0], model.line.s[-1])
         self.start[:] = Grid(s, model.zones, at, model.attached).nodes @ r
-        self.start[np.searchsorted(self._nodes, model.nodes)] = r  # to the last bit: a restored line counts from there
+        self.start[np.searchsorted(self.nodes, model.nodes)] = r  # to the last bit: a restored line counts from there
 
     def start_of(self, nodes: Floats) -> Floats:
         """Positions (N+1, 3) m from which displacements of nodes (N+1,) m count."""
-        return self.start[np.searchsorted(self._nodes, nodes)]
-
-    def fold(self, nodes: Floats, extremes: Floats) -> None:
-        """Take in the extremes (4, EXTREMES, N+1+K) of a mesh that ends; of no rows, before the first mesh."""
-        if extremes.shape[1]:
-            self.bounds[:] = self._with(nodes, extremes)
+        return self.start[np.searchsorted(self.nodes, nodes)]
 
     def _with(self, nodes: Floats, extremes: Floats) -> Floats:
         """All extremes (4, EXTREMES, n), with those (4, EXTREMES, N+1+K) of the mesh of now."""

@@ -345,22 +345,18 @@ class RunLine:
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
 
-    def use_cells(self, model: Model, extremes: bool = True, books: Books | None = None) -> None:
-        """Go on with other cells; extremes: whether those of now count; books: that go with them, if they are known."""
-        was, before = self.model, self.books
+    def use_cells(self, model: Model, books: Books) -> None:
+        """Go on with other cells, and books that go with them."""
         self.use_model(model, other_cells=True)
-        if books is not None:
-            self.books = books._replace(touch=self._blank_touch())
-            return
-        names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
-        same = {name: getattr(before, name) for name in names}
-        blank = self._blank_books(self.envelope.start_of(model.nodes))
+        self.books = books._replace(touch=self._blank_touch())
+
+    def begin_cells(self, model: Model) -> None:
+        """Begin anew with other cells, of which a checkpoint will say what there is to know."""
+        self.use_model(model, other_cells=True)
+        before, blank = self.books, self._blank_books(self.envelope.start_of(model.nodes))
         before.clock.wave_step = blank.clock.wave_step
-        self.books = blank._replace(**same)
-        self.books.work[:], self.books.power[:] = before.work, before.power
-        self.books.velocity[:] = before.velocity
-        if extremes:
-            self.envelope.fold(was.nodes, before.extremes)
+        names = "asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed", "work", "power"
+        self.books = blank._replace(velocity=before.velocity, **{name: getattr(before, name) for name in names})
 
     def adopt_cells(self, model: Model) -> None:
         """Go on with other cells, which steps have changed to with the books, of which some outputs may wait."""

@@ -328,7 +328,7 @@ class RunPayout(Part):
         line.books.work[0, b.ZONES] += booked
         run.model = run.model.with_lines({k: model})
         run.state = NetworkState(states, run.state.bodies)
-        line.use_cells(model, books=books if zones is None else None)
+        line.use_cells(model, books)
 
     def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
         """Ends (line, 0 or 1) come loose: at a winch no more line comes."""
@@ -365,7 +365,7 @@ class RunPayout(Part):
                 self.zones[k].resume(model)
             run.model = run.model.with_lines({k: model})
             states[k] = state_for(model.line)
-            run.lines[k].use_cells(model, extremes=False)
+            run.lines[k].begin_cells(model)
         run.state = NetworkState(states, run.state.bodies)
         return True
 

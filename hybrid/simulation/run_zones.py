@@ -266,7 +266,7 @@ class RunZones(Part):
             x.switching, x.pending = ZoneSwitching(model, manager), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
-            run.lines[k].use_cells(model, extremes=False)
+            run.lines[k].begin_cells(model)
         run.model, run.state = run.model.with_lines(models), run.state._replace(lines=states)
         return True
 
@@ -367,7 +367,7 @@ class RunZones(Part):
         states = [*run.state.lines]
         states[k] = state
         run.model, run.state = run.model.with_lines({k: model}), run.state._replace(lines=states)
-        line.use_cells(model, books=books if x.paid is None else None)
+        line.use_cells(model, books)
         if x.paid is not None:  # a node that enters or leaves now asks for the rates of tensions, as of the old cells
             middle, old = (0.5 * (s[:-1] + s[1:]) for s in (model.line.s, at))
             line.books.tension[0] = state.T - np.interp(middle, old, risen)

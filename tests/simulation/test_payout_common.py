@@ -20,6 +20,8 @@ from test_system_payout import crane, to_a_buoy
 
 import hybrid
 from hybrid.errors import SceneError
+from hybrid.simulation.payout_nodes import NodeChanges
+from tests.inside import calls_of
 
 Tables = dict[str, Any]
 MODELS = {
@@ -352,3 +354,32 @@ def test_a_winch_that_holds_a_tension_has_the_length_of_rods(model: Any, like: i
         lengths.append(hybrid.run(scene)["payout/length"])
     assert np.ptp(lengths[1]) > 3.0
     assert np.abs(lengths[0] - lengths[1]).max() < 0.02
+
+
+# --- nodes that enter and leave within the steps ----------------------------------------------------------------
+
+STEPPED = {
+    **{name: LAWS[name] for name in ("creep", "torque", "polyester", "vortices")},
+    "vortices from the start": exchanged(LAWS["vortices"]),
+    "layers": layers.paid("layers"),
+    "layers, taken in": layers.paid("layers", rate=-0.8),
+    "table": layers.paid("table"),
+}
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_nodes_of_lines_with_laws_change_as_with_another_solver(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    one_by_one = calls_of(monkeypatch, NodeChanges, "change_once")
+    found = hybrid.run(STEPPED[name])
+    assert not one_by_one
+    monkeypatch.setattr(NodeChanges, "may_change", lambda *_: False)
+    other = hybrid.run(STEPPED[name])
+    assert len(one_by_one) >= 2
+    for of in ("position", "tension", "steps/end_force_end", "work/scheme", "work/zones", "envelope/curvature_max"):
+        if of in found.names:
+            most = (
+                1e-10 * np.nanmax(np.abs(other[of]))
+                if of.startswith("work")
+                else 4.0 * np.spacing(np.nanmax(other[of]))
+            )
+            np.testing.assert_allclose(found[of], other[of], rtol=0.0, atol=most, err_msg=of)

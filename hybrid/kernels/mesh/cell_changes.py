@@ -39,7 +39,7 @@ from hybrid.kernels.state.report import AXIAL_LAW, FRICTION, PLANAR, SEABED_ENER
 from hybrid.kernels.state.state import Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blanks
 from hybrid.kernels.step.line_step import read
 from hybrid.kernels.step.step import friction_axes
-from hybrid.kernels.watch.extremes import carry_extremes, fold_gone, match_nodes
+from hybrid.kernels.watch.extremes import carry_extremes, fold_gone, match_nodes, put_starts
 
 
 class CellPlanner(NamedTuple):
@@ -69,15 +69,17 @@ blank_cell_planner = blanks(CellPlanner)
 class RenewJob(NamedTuple):
     """What a run knows of a line beside its state: before a change, of N cells, and after it, of M."""
 
-    s: Floats  # (N+1,) m, old nodes
+    s: Floats  # (N+1,) m, old nodes; at a winch those that come next, by which extremes are kept
     rods: NDArray[np.bool_]  # (N,) whether old cells are rod
-    to_s: Floats  # (M+1,) m, new nodes
+    to_s: Floats  # (M+1,) m, new nodes, likewise
     to_rods: NDArray[np.bool_]  # (M,) and cells
     line: Line
     place: NDArray[np.int64]  # (M+1,)
     of: NDArray[np.int64]  # (M,)
     first: NDArray[np.int64]  # (n+1,)
     start: Rows  # (K+1, 3) m, of the nodes of the finest mesh: positions from which displacements count
+    start_s: Floats  # (K+1,) m, these nodes
+    always: NDArray[np.int64]  # base nodes whose displacement is watched
     marked: NDArray[np.int8]  # (n+1,) marks of base nodes
     borne: Floats  # (n,) length over unstretched length that base cells bear
     state: State  # of the new cells
@@ -161,15 +163,14 @@ def set_aside(job):
 @inner
 def fill_books(job):
     """What is kept of nodes and cells begins anew."""
-    books, m = job.books, job.of.shape[0]
+    books, m, column = job.books, job.of.shape[0], job.of.shape[0] + 1
+    put_starts(job.to_s, job.start_s, job.start, books.start)
     for i in range(m + 1):
         books.marks[i], books.right[i] = 0, i
-        for j in range(3):
-            books.start[i, j] = job.start[job.place[i], j]
-    column = m + 1
+    for j in range(job.always.shape[0]):
+        books.base[j] = job.first[job.always[j]]
     for j in range(job.first.shape[0]):
         i = job.first[j]
-        books.base[j] = i
         if job.marked[j]:
             books.marks[i], books.right[i] = job.marked[j], column
             column += 1
@@ -289,12 +290,6 @@ def renew(table):
     for c in range(job.width.shape[0]):
         job.width[c] = job.widths[job.of[c]]
     clock.previous = clock.now
-
-
-@kernel
-def renew_zones(table):
-    """What criteria know of the new cells alone: of a line whose books go by what a winch may let out."""
-    begin_zones(read_renew(table))
 
 
 # --- forces ---------------------------------------------------------------------------------------

@@ -49,7 +49,7 @@ from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import NO_SOIL, Blocks, Ends, Floats, Line, Rows, Sea, State, Work, blank_state, blanks
 from hybrid.kernels.step.step_control import lead
-from hybrid.kernels.watch.extremes import fold_node
+from hybrid.kernels.watch.extremes import fold_gone, put_starts
 
 
 class CarryJob(NamedTuple):
@@ -458,8 +458,12 @@ class NodeJob(NamedTuple):
     nearest: NDArray[np.int64]  # (2,) the pair of its cells that was nearest
     borne: Floats  # (P,) length over unstretched length that pieces bear, as of Reel.pieces
     widths: Floats  # (P,) m, their diameters
-    start: Rows  # (M, 3) m, of all material nodes along the line: positions from which displacements count
-    bounds: Blocks  # (4, EXTREMES, E) extremes at all nodes, along the line, those that are marked twice
+    start: Rows  # (M, 3) m, of all nodes that there may be: positions from which displacements count
+    start_s: Floats  # (M,) m, these nodes, and one work array likewise
+    kept: Floats
+    envelope_s: Floats  # (E,) m, places of extremes of all meshes
+    bounds: Blocks  # (4, EXTREMES, E)
+    gone: NDArray[np.int64]  # (M,) -1: no node stays
     moment: Rows  # (M+1, 3) this and the next: work arrays
     strain: Rows
     energy: Floats  # (5,)
@@ -511,33 +515,29 @@ def lie_wide(line, reel, widths, first):
 
 
 @inner
-def fold(job, n, forward):
-    """Take the extremes of the old nodes into those of all: the fairlead counts for the next node."""
-    books, columns = job.before, job.bounds.shape[2]
-    at = 0 if forward else columns - job.before.extremes.shape[2]
-    for i in range(n + 1):
-        fold_node(books.extremes, i, at, job.bounds)
-        at += 1
-        if books.right[i] != i:
-            fold_node(books.extremes, books.right[i], at, job.bounds)
-            at += 1
+def kept_nodes(line, reel, nodes, out):
+    """(N+1,) m, arc lengths by which extremes are kept: of what moves with the fairlead those of the nodes to come."""
+    n, g = line.h.shape[0], growing(line, reel)
+    for k in range(n + 1):
+        i = node(line, reel, k)
+        out[i] = line.s[i] if k <= g else reel.numbers.far + reel.numbers.side * nodes[k]
 
 
 @inner
 def renew_books(job, n, m, forward, cut):
     """What a run knows beside its state, of the new nodes and cells."""
-    before, books, start, s = job.before, job.books, job.start, job.carry.target.s
+    before, books, s, carry, column = job.before, job.books, job.carry.target.s, job.carry, m + 1
     if before.extremes.shape[1] > 0:
-        fold(job, n, forward)
+        kept_nodes(carry.line, carry.reel, carry.nodes, job.kept)
+        fold_gone(job.kept[: n + 1], before.extremes, before.right, job.gone, job.envelope_s, job.bounds)
+    kept_nodes(carry.target, carry.new, carry.nodes, job.kept)
+    put_starts(job.kept[: m + 1], job.start_s, job.start, books.start)
     move_row(before.marks, books.marks, forward, cut, m - n)
-    column, first = m + 1, 0 if forward else start.shape[0] - 1 - m
     for i in range(m + 1):
         books.right[i] = i
         if books.marks[i]:
             books.right[i] = column
             column += 1
-        for j in range(3):
-            books.start[i, j] = start[first + i, j]
     for c in range(m):
         piece = piece_at(job.carry.new, 0.5 * (s[c] + s[c + 1]))
         books.borne[c] = job.borne[piece]

@@ -298,6 +298,16 @@ def first_from(s, x, i):
 
 
 @inner
+def put_starts(s, places, start, out):
+    """Positions from which displacements of nodes s count into `out`, of rows `start` at `places`, some of which they are."""
+    at = 0
+    for i in range(s.shape[0]):
+        at = first_from(places, s[i], at)
+        for j in range(3):
+            out[i, j] = start[at, j]
+
+
+@inner
 def fold_node(now, column, i, out):
     """Take a column of extremes `now` into those of place i."""
     for row in range(now.shape[1]):
