@@ -86,7 +86,7 @@ class CellChanges(Remesh):
         now = Cells(layout.places, model.line.s, layout.base_of_cell, layout.rod_cells)
         self._cells = Given(now) if once else Room(layouts, most), Room(layouts, most)
         self._match = Room(matches, most)
-        self._by_nodes: tuple[Floats, Floats] | None = None  # nodes before and after by which extremes are kept, at a winch
+        self._by_nodes: tuple[Floats, Floats] | None = None  # at a winch, by which extremes are kept
         self._clamps, self._held = np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._shifts, self._places = np.array([not self.in_steps]), np.zeros(MOST_PLACES, np.int64)
 

@@ -70,9 +70,9 @@ from hybrid.kernels.laws.element import (
 )
 from hybrid.kernels.laws.node_forces import Z9, node_loads
 from hybrid.kernels.laws.tension_torque import couples
-from hybrid.kernels.laws.water import LIFT_A, LIFT_B
+from hybrid.kernels.laws.water import LIFT_A, LIFT_B, OFFSET
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.mesh.remesh import B_1, COLUMNS, fill_cell, fill_element, fill_node
+from hybrid.kernels.mesh.remesh import B_1, COLUMNS, fill_cell, fill_element, fill_node, move_line
 from hybrid.kernels.reel.reel import LENGTH_OF, STRAIN_OF
 from hybrid.kernels.state.report import BENDING_LAW, ROTARY, VORTICES
 from hybrid.kernels.watch.extremes import moment_at
@@ -358,6 +358,42 @@ def prepare(line, reel, t):
     for k in range(growing(line, reel), line.h.shape[0]):
         line.h[cell(line, reel, k)] = reel.true[k]
     set_lengths(line, reel, t)
+
+
+@inner
+def line_as(line, out, reel, nodes):
+    """The same line in another number of cells, its length still to be given to it; what comes is made as on the reel."""
+    n, m, rides = line.h.shape[0], out.h.shape[0], reel.layer.shape[0]
+    g, grows = n - rides, m - rides
+    move_line(line, out, reel.numbers.side > 0.0, min(g, grows) + 1, m - n)
+    complete(out, reel, nodes, g, grows)
+    for k in range(grows, m + 1):
+        i = node(out, reel, k)
+        out.force[i, 0], out.force[i, 1] = 0.0, 0.0  # what rounding leaves of those on nodes that ride
+
+
+@inner
+def go_round(line, reel, first):
+    """Phases of vortices (kernels.laws.water) go on along the line at its nodes from `first` on."""
+    law, a, b = line.wake_law, node(line, reel, 0), node(line, reel, 1)
+    rate = (law[b, OFFSET] - law[a, OFFSET]) / (line.s[b] - line.s[a])
+    for k in range(first, line.h.shape[0] + 1):
+        i = node(line, reel, k)
+        law[i, OFFSET] = law[a, OFFSET] + rate * (line.s[i] - line.s[a])
+
+
+@inner
+def lie_wide(line, reel, widths, first):
+    """Diameters, m, with which nodes from `first` on lie in soil: between those of their cells, of the pieces here."""
+    n = line.h.shape[0]
+    for k in range(first, n + 1):
+        i, c = node(line, reel, k), cell(line, reel, k - 1)
+        one, before, after = widths[piece_at(reel, 0.5 * (line.s[c] + line.s[c + 1]))], reel.true[k - 1], 0.0
+        other = one
+        if k < n:
+            c, after = cell(line, reel, k), reel.true[k]
+            other = widths[piece_at(reel, 0.5 * (line.s[c] + line.s[c + 1]))]
+        line.bed_width[i] = one + after / (before + after) * (other - one)
 
 
 # Nodes before the cell that grows, and behind it, whose elements and cells are others than before; one to spare.

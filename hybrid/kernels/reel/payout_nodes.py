@@ -19,23 +19,25 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import has_law, strain_and_energy_at
 from hybrid.kernels.laws.seabed import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
-from hybrid.kernels.laws.water import OFFSET, PHASE
+from hybrid.kernels.laws.water import PHASE
 from hybrid.kernels.machine.binding import places
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
 from hybrid.kernels.march.energies import Observed
 from hybrid.kernels.mesh.cell_changes import begin_anew, energy_in, make_stiffness
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, move_line
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces
 from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.mesh.zone_transfer import put3
 from hybrid.kernels.reel.paid_length import (
     carry_layers,
     cell,
     changes_length,
-    complete,
+    go_round,
     growing,
     lack_rate,
     length_at,
+    lie_wide,
+    line_as,
     made_between,
     node,
     piece_at,
@@ -476,42 +478,6 @@ read_node = reader(blank_node_job())
 
 
 # --- one change -----------------------------------------------------------------------------------
-
-
-@inner
-def line_as(line, out, reel, nodes):
-    """The same line in another number of cells, its length still to be given to it; what comes is made as on the reel."""
-    n, m, rides = line.h.shape[0], out.h.shape[0], reel.layer.shape[0]
-    g, grows = n - rides, m - rides
-    move_line(line, out, reel.numbers.side > 0.0, min(g, grows) + 1, m - n)
-    complete(out, reel, nodes, g, grows)
-    for k in range(grows, m + 1):
-        i = node(out, reel, k)
-        out.force[i, 0], out.force[i, 1] = 0.0, 0.0  # what rounding leaves of those on nodes that ride
-
-
-@inner
-def go_round(line, reel, first):
-    """Phases of vortices (kernels.laws.water) go on along the line at its nodes from `first` on."""
-    law, a, b = line.wake_law, node(line, reel, 0), node(line, reel, 1)
-    rate = (law[b, OFFSET] - law[a, OFFSET]) / (line.s[b] - line.s[a])
-    for k in range(first, line.h.shape[0] + 1):
-        i = node(line, reel, k)
-        law[i, OFFSET] = law[a, OFFSET] + rate * (line.s[i] - line.s[a])
-
-
-@inner
-def lie_wide(line, reel, widths, first):
-    """Diameters, m, with which nodes from `first` on lie in soil: between those of their cells, of the pieces here."""
-    n = line.h.shape[0]
-    for k in range(first, n + 1):
-        i, c = node(line, reel, k), cell(line, reel, k - 1)
-        one, before, after = widths[piece_at(reel, 0.5 * (line.s[c] + line.s[c + 1]))], reel.true[k - 1], 0.0
-        other = one
-        if k < n:
-            c, after = cell(line, reel, k), reel.true[k]
-            other = widths[piece_at(reel, 0.5 * (line.s[c] + line.s[c + 1]))]
-        line.bed_width[i] = one + after / (before + after) * (other - one)
 
 
 @inner
