@@ -132,13 +132,9 @@ class PaidZones:
         """
         paying, manager = self.paying, self.manager
         paying.foreseen = paying.fastest
-        known, relaxing = manager.zones.counts.known, manager.zones.counts.relaxing
-        ages = manager.zones.clock.age, manager.zones.clock.recent_age
         self._use_base(model, source)
-        near, zones = paying.plan.at_winch(source.size - paying.rides, 0.0), manager.zones
-        zones.grown[near], zones.leaving[near] = 1.0, False
-        zones.counts.known, zones.counts.relaxing = known, relaxing
-        zones.clock.age, zones.clock.recent_age = ages
+        near = paying.plan.at_winch(source.size - paying.rides, 0.0)
+        manager.grown[near], manager.leaving[near] = 1.0, False
 
     def resume(self, model: Model) -> None:
         """Go on with the cells of a checkpoint, from which all else follows (ZoneSwitching.restore)."""

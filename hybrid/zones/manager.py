@@ -354,8 +354,8 @@ class DomainManager:
     ) -> None:
         """Go on with base cells of which some have come or gone, where they are one cell each.
 
-        source: (n,) which old base cell a new one is, or has come from; given: as of the constructor; anew: for how
-        many steps nodes could have gone is not known.
+        source: (n,) which old base cell a new one is, or has come from; given: as of the constructor; anew: nothing is
+        known of earlier steps.
         """
         old, n, places = self.zones, layout.rod.size, layout.starts[-1] + 1
         blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool))
@@ -363,8 +363,9 @@ class DomainManager:
         kept |= {name: getattr(old, name)[source] for name in ("leaving", "grown", "ramp_factor")}
         for name in ("idle_steps", "waves"):
             x = getattr(old, name)
-            there = np.zeros(places, x.dtype) if anew else on_other_parts(self.layout, x, source, layout.parts)
-            kept[name] = there
+            kept[name] = np.zeros(places, x.dtype) if anew else on_other_parts(self.layout, x, source, layout.parts)
+        clock, flags = old.clock, old.counts
+        known = flags.known, flags.relaxing, clock.age, clock.recent_age
         self.zones = blank._replace(**kept)
         for name in ("below_since", "wait_factor", "released", "buffer"):
             setattr(self, name, getattr(self, name)[source])
@@ -372,6 +373,8 @@ class DomainManager:
         self.given, self.free, self.on_base = given, (given >= 0).astype(np.int8), on_base
         self.measure(layout)
         self.set_layout(layout)
+        if not anew:
+            flags.known, flags.relaxing, clock.age, clock.recent_age = known
 
     def use_cells_of(self, layout: Layout, zones: Zones) -> None:
         """Go on with other cells of the same base, of which `zones` knows all."""

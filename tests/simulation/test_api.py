@@ -209,8 +209,8 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 
 
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
-    """All entries that take a table, of which none is forgotten, but for what joined lines and a release ask for."""
-    others = {"end_payout", "iterate_with_others"}
+    """All entries that take a table, of which none is forgotten, but for what joined lines, zones and a release ask for."""
+    others = {"end_payout", "iterate_with_others", first_use.PAID_ZONES.split(".")[-1]}
     entry = type(payout_nodes.plan_node)
     used = {
         x.__qualname__
