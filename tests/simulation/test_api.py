@@ -210,7 +210,7 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
     """All entries that take a table, of which none is forgotten, but for what joined lines, zones and a release ask for."""
-    others = {"end_payout", "iterate_with_others", first_use.PAID_ZONES.split(".")[-1]}
+    others = {"end_payout", "iterate_with_others", "carry_zones"}
     entry = type(payout_nodes.plan_node)
     used = {
         x.__qualname__
@@ -219,12 +219,14 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
         if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
     }
     assert used - others <= {x.__qualname__ for x in first_use.payout_kernels()}
-    scene = hybrid.validate_scene(cable_scene(
-        {"length": 40.0, "mass": 2.0}, {"kind": "free"}, pinned_at(0, 0, 0, payout={"longest": 60}), model="catenary",
-        mesh=20, time=(10, 0.05)
-    ))  # fmt: skip
-    paid = first_use.PAYOUT_OF_LINES[0]
-    assert paid in first_use.kernels_of(scene)
+    given = cable_scene(
+        {"length": 40.0, "mass": 2.0, "bending_stiffness": 1.0}, {"kind": "free"},
+        pinned_at(0, 0, 0, payout={"longest": 60}), model="catenary", mesh=20, time=(10, 0.05)
+    )  # fmt: skip
+    scene, moves = hybrid.validate_scene(given), hybrid.validate_scene(given | {"model": "adaptive"})
+    paid, zones = first_use.PAYOUT_OF_LINES[0], first_use.PAID_ZONES
+    assert paid in first_use.kernels_of(scene) and zones not in first_use.kernels_of(scene)
+    assert zones in first_use.kernels_of(moves)
     assert paid not in first_use.kernels_of(scene, static=True)
 
 
