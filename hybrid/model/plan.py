@@ -17,7 +17,7 @@ from hybrid.errors import refuse_value, renamed
 from hybrid.kernels.laws.water import still_below
 from hybrid.kernels.state.report import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.step_control import SAFETY, weights
+from hybrid.kernels.step.step_control import SAFETY, decimal_time, weights
 from hybrid.model.build import Model, build
 from hybrid.model.contents import MEETS, Entry, that_may_meet, with_accuracy
 from hybrid.model.initial_shape import HUNG, hung
@@ -438,7 +438,7 @@ def output_times(scene: LineScene) -> list[float]:
     """Times (s) of the outputs after the first."""
     refuse_too_much(scene)
     time, every = scene.require_time(), scene.output_interval
-    return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
+    return [decimal_time.py_func(k * every) for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
 @dataclass(frozen=True)

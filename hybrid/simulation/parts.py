@@ -35,6 +35,7 @@ ORDER = (
     "payout",  # before what breaks: a winch may come to its end in the step that breaks its line
     "failures",  # last of what changes lines: what comes loose does so from all of them as they are
     "own",  # a user's own parts see a step with all that it has changed
+    "diagnostics",  # of the first state as all others have left it
     "vibrations",  # bounds the steps to come, whatever has changed
     "quantities",  # from here on parts only look
     "rotations",

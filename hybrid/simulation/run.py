@@ -31,7 +31,14 @@ from hybrid.simulation.progress import at_once
 from hybrid.simulation.restart import LoadChange, kept_resolution, other_program, refused, require_same
 from hybrid.simulation.run_contact import RunContact, refuse_within_itself
 from hybrid.simulation.run_line import RunLine, Wanted
-from hybrid.simulation.run_of_lines import LoadChanges, ProgressOfRun, WatchedLines, loaded_as, with_loads_of
+from hybrid.simulation.run_of_lines import (
+    FirstStates,
+    LoadChanges,
+    ProgressOfRun,
+    WatchedLines,
+    loaded_as,
+    with_loads_of,
+)
 from hybrid.simulation.run_record import ALONE, RecordedRun, Recording, RunFile, RunRecorder, kept_changes, restore
 from hybrid.simulation.run_start import begin_as_placed, blended_of_lines, named
 from hybrid.simulation.run_steps import Cuts, Failures, VibrationsOfLines, VibrationSteps
@@ -130,10 +137,6 @@ class Run(RecordedRun):
             solver.evaluate_forces(self.state, solver.anchor)  # what nothing holds has no report without its springs
             for part in self.parts:
                 part.at_rest()
-            turned = self.turned
-            for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
-                line.held = x.ends.held
-                line.note_equilibrium(x, state, None, self.found, turned)
             self.renew_other()
             self.loop.attach(solver, self.state, self.other)
             self._output()
@@ -183,7 +186,6 @@ class Run(RecordedRun):
 
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
-        time = self.network.require_time()
         if self.found is None:
             begin_as_placed(self.model, self.scenes, self.state, [line.events for line in self.lines])
         for part in self.parts:
@@ -203,14 +205,6 @@ class Run(RecordedRun):
             text = "waves act on lines and points, not on the body, which has no members"
             for body in (x for x in self.model.bodies if x.members is None):
                 self.note("waves on body neglected", f"body {body.name}: {text}")
-        turned = self.turned
-        for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
-            if self.found is not None:
-                line.note_equilibrium(x, state, 0.0, self.found, turned)
-            else:
-                line.note_start(x, state, 0.0)
-            line.diagnostics.scheme(time.rho_inf)
-            line.diagnostics.watch(line.books.clock)
         self.renew_other()
         self._attach()
         self._output()
@@ -551,6 +545,7 @@ def _equip(run: Run, first: First, network: Network, text: Text, recording: Reco
     parts += [
         LoadChanges(me, run.changes, first.changed),
         WatchedLines(me),
+        FirstStates(me),
         contact,
         Cuts(me, contact, run.target is None),
         Failures(me),

@@ -368,6 +368,37 @@ class WatchedLines(Part):
                 line.watch(LineStep(run.t, new, old, work.report, line.books))
 
 
+class FirstStates(Part):
+    """What is doubtful about the first state of each line, and beyond which values steps are to flag it later."""
+
+    name = "diagnostics"
+
+    def __init__(self, run: RunOfLines) -> None:
+        self._run = run
+
+    def begin(self) -> None:
+        """Note it of a start."""
+        self._note(0.0)
+        for line in self._run.lines:
+            line.diagnostics.scheme(self._run.network.require_time().rho_inf)
+            line.diagnostics.watch(line.books.clock)
+
+    def at_rest(self) -> None:
+        """Note it of an equilibrium that is the result."""
+        for line, x in zip(self._run.lines, self._run.solver.lines, strict=True):
+            line.held = x.ends.held
+        self._note(None)
+
+    def _note(self, t: float | None) -> None:
+        """t: s, where a motion starts, None: there is none."""
+        run, turned = self._run, self._run.turned
+        for line, x, state in zip(run.lines, run.solver.lines, run.state.lines, strict=True):
+            if run.found is not None:
+                line.note_equilibrium(x, state, t, run.found, turned)
+            else:
+                line.note_start(x, state, t)
+
+
 # Other loads and other motions of points and bodies from some time of a run of several lines on.
 
 # Tables of a network in which loads and motions stand.

@@ -17,6 +17,7 @@ from hybrid.errors import OMITTED
 from hybrid.store import recorder as record
 from hybrid.store.hdf5_file import opened
 from hybrid.store.whole_file import read_checkpoint
+from tests.scenes import cable_scene, pinned_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Adaptive zones, friction, seas, a plane, the model error, steps that follow the error, a climb to an accuracy with
@@ -201,6 +202,25 @@ def test_a_run_goes_on_to_the_bit_behind_a_step_that_was_shortened(tmp_path):
     first = float(whole["steps/t"][np.flatnonzero(whole["steps/repeats"])[0]])
     hybrid.run(falling(round(np.ceil(10.0 * first - 1e-6) / 10.0, 6)), output=tmp_path / "part.h5")
     assert np.array_equal(hybrid.resume(tmp_path / "part.h5", until=2.0).position, whole.position)
+
+
+@pytest.mark.parametrize(("step", "cuts"), [(0.1, (0.7, 1.2)), (0.02, (0.58,)), (0.05, (0.35, 1.15))])
+def test_a_run_goes_on_to_the_bit_where_steps_do_not_sum_up_to_its_end(step, cuts, tmp_path):
+    """7 times 0.1 is 0.7000000000000001: an output and a step are at the time that is said."""
+
+    def lasting(duration):
+        return cable_scene(
+            {"length": 5, "mass": 2, "axial_stiffness": 1e4, "bending_stiffness": 1.0}, pinned_at(0, 0, 0), {"kind": "free"},
+            initial={"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, model="rod", mesh=6,
+            time=(duration, step), output={"every": step},
+        )  # fmt: skip
+
+    whole = hybrid.run(lasting(2.0))
+    for cut in cuts:
+        hybrid.run(lasting(cut), output=tmp_path / f"{cut}.h5").close()
+        longer = hybrid.resume(tmp_path / f"{cut}.h5", until=2.0)
+        assert np.array_equal(longer.t, whole.t) and cut in whole.t
+        assert np.array_equal(longer.position, whole.position)
 
 
 def test_a_step_that_is_taken_back_is_the_same_again():

@@ -161,6 +161,17 @@ def scheme(rho, before, rho_before, dt):
 HALVINGS = 10
 
 
+NANOSECONDS = 1e9  # 1/s: a time of few decimals is a whole number of them
+ROUND_OFF = 5e-16  # of a time: what a sum of equal steps, each rounded, is off
+
+
+@inner
+def decimal_time(t: float) -> float:
+    """A time (s) that equal steps lead to, in as few decimals as it has: 0.7 for 7 times 0.1, 0.7000000000000001."""
+    near = math.floor(t * NANOSECONDS + 0.5) / NANOSECONDS
+    return near if abs(near - t) <= ROUND_OFF * abs(t) else t
+
+
 @inner
 def begin_step(clock, count):
     """Choose where the next step should end."""
@@ -171,7 +182,7 @@ def begin_step(clock, count):
         count.leg_part += 1
         clock.until = clock.stop
         if count.leg_part < count.leg_parts:
-            clock.until = clock.leg_begin + count.leg_part * clock.leg_step
+            clock.until = decimal_time(clock.leg_begin + count.leg_part * clock.leg_step)
     clock.tried_dt = clock.until - clock.now
     if not count.controlled:
         clock.shortest = clock.tried_dt * 0.5**HALVINGS
