@@ -18,9 +18,20 @@ from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygo
 from problems import pinned
 
 from hybrid.kernels.mesh.cell_errors import CURVATURE
-from hybrid.kernels.mesh.zone_criteria import BEND, CLAMP, CRITERIA, EDGE, FORESEEN, POINT, SLACK, TORSION
+from hybrid.kernels.mesh.zone_criteria import BEND, CLAMP, CONTACT, CRITERIA, EDGE, FORESEEN, POINT, SLACK, TORSION
 from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO
-from hybrid.kernels.state.report import SEABED
+from hybrid.kernels.state.report import (
+    AXIS,
+    CARRIED,
+    MOVES,
+    OBSTACLE,
+    OBSTACLES,
+    RADIUS,
+    SEABED,
+    SPEED,
+    STRAND,
+    TURNED,
+)
 from hybrid.kernels.state.state import no_sea
 from hybrid.model.material import TENSION_FLOOR, Material
 from hybrid.zones.manager import Allowed, DomainManager, Times, wanted
@@ -214,6 +225,23 @@ def test_edge_of_contact(begins):
     assert ratio[crossed] == pytest.approx(0.5 * EI * W / 50.0**2 / TOL, rel=ROUND)
     near = np.unique(np.concatenate([crossed - 1, crossed, crossed + 1]))
     assert not np.delete(ratio, near).any()
+
+
+@pytest.mark.parametrize(
+    ("speed", "of_plane", "ahead"), [(0.0, 0.0, 0.0), (-1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 1.0)]
+)
+def test_an_obstacle_is_as_near_as_it_will_be_an_eighth_of_a_hold_time_ahead(speed, of_plane, ahead):
+    """2 D/(gap + D) of a strand of D = 0.2 m whose surface is 0.3 m above a plane, which may come to it as well."""
+    zones, dwell, gap, D = even(10, "C" * 10), 0.5, 0.3, 0.2
+    line = on(cable(), zones, OBSTACLES)._replace(moved=np.array([MOVES] if of_plane else [], np.int8))
+    rows, carried = np.zeros((1, OBSTACLE)), np.zeros((1, CARRIED))
+    rows[0, AXIS : AXIS + 3], rows[0, RADIUS], rows[0, STRAND] = Z, 0.5 * D, 0.5 * D
+    carried[0, SPEED : SPEED + 3], carried[0, TURNED : TURNED + 9] = of_plane * Z, np.eye(3).ravel()
+    sea = no_sea(line.h.size)._replace(obstacles=rows, carried=carried)
+    state = state_on(line, lambda s: np.column_stack([s, 0 * s, 0 * s + gap + 0.5 * D]), 50.0)
+    state.v[:, 2] = speed
+    ratios = weighed(cable(), zones, state, sea=sea, bits=OBSTACLES, dwell=dwell, line=line)
+    assert ratios[CONTACT] == pytest.approx(2 * D / (gap - ahead * LOOKAHEAD * dwell + D), rel=ROUND)
 
 
 def test_contact_begins_half_an_onset_above_the_bed():

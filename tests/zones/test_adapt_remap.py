@@ -33,11 +33,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from problems import order
 
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.mesh import zone_transfer
 from hybrid.model.mesh import edges
 
 ROUND = 1e-12
 SHAPES = {"hanging": hanging(), "helix": helix()}
 NODAL, CELLS = ("r", "v", "a", "vd", "slip"), ("e", "T", "a1", "w", "wa", "wd")
+
+
+@kernel
+def tension_at(s, T, single, at):
+    return zone_transfer.tension_at(s, T, single, 1, at)
+
+
+@pytest.mark.parametrize(("tension", "beside"), [(1.0, 1.0), (6.0, 4.4)])
+def test_no_slack_comes_out_of_a_tension_that_falls_towards_an_end(tension: float, beside: float) -> None:
+    """10 N in the cell before, 0.4 m behind the middle of the last cell: a straight line, unless it is slack at the end."""
+    found = tension_at(np.arange(3.0), np.array([10.0, tension]), np.array([1, 0, 1], np.int8), 1.9)
+    assert found == pytest.approx(beside)
 
 
 # --- random layouts ------------------------------------------------------------------------------------

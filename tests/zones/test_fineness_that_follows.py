@@ -8,12 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from adapt_cases import Z, cable, followed, hanging, layout, on, state_on, still, transfer_to
+from adapt_cases import Z, along, cable, followed, hanging, layout, on, state_on, still, transfer_to
 
 import hybrid
 from hybrid.accuracy.passes import free_in
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.mesh import cell_lengths as cl
+from hybrid.kernels.mesh import zone_criteria as zc
+from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.zone_criteria import EDGE
+from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read
 from hybrid.kernels.mesh.zone_transfer import transfer
 from hybrid.kernels.state.report import SEABED
 from hybrid.kernels.state.state import Floats, no_sea
@@ -24,6 +29,51 @@ from hybrid.store.records import MeshHistory, ZoneHistory, node_bits
 from hybrid.store.records import Zone as ZoneRow
 from hybrid.zones.manager import Allowed, DomainManager, Times
 from tests.scenes import cable_scene, pinned_at
+
+
+@kernel
+def raise_hinges(table):
+    job = read(table)
+    cl.raise_at_hinges(job.line, job.new, job.zones, 1.0)
+
+
+@kernel
+def shortest(kinds, T, kappa, limits):
+    return cl.shortest_length(kinds, T, 1, kappa, 1.0, limits, 1.0)
+
+
+@kernel
+def wanted_here(kinds, T, bend, limits, out):
+    for i in range(out.size):
+        out[i] = cl.wanted_length(kinds, T, bend, i, 1.0, limits, 1.0)
+
+
+@kernel
+def lower_edges(table, dt):
+    job = read(table)
+    cl.lower_at_edges(job.line, job.sea, job.new, job.zones, dt, 1.0)
+
+
+@kernel
+def wanted_ahead(table, dt):
+    job = read(table)
+    return cl.find_wanted(job.line, job.sea, job.new, job.zones, dt, 1.0)
+
+
+@kernel
+def is_steady(table, p, b):
+    return cl.is_steady(read(table).zones, p, b)
+
+
+@kernel
+def relax_arcs(table):
+    job = read(table)
+    cl.relax_arcs(job.line, job.new, job.zones)
+
+
+@kernel
+def left_at_hinge(line, T, kinds):
+    return zc.left_at_hinge(line, T, kinds, 0)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.4], ids=["by curvature", "by turn"])
@@ -61,6 +111,42 @@ def test_no_cells_are_spent_on_the_layer_of_a_hinge() -> None:
     assert near[1] > 4.0 * near[0], near
 
 
+@pytest.mark.parametrize("how", ["leaving", "grown"])
+def test_the_layer_of_a_hinge_is_three_lengths_of_bending(how: str) -> None:
+    """sqrt(EI/T) is 0.2 m: nodes within 0.6 m of the hinge are freed, no others."""
+    found = followed(along(), 0.02, tolerance=1e3)
+    zones = found.manager.zones
+    found.state.T[:], zones.moment[:], zones.wanted[:] = 50.0, 0.0, 0.0
+    getattr(zones, how)[4:8] = how == "leaving"  # on its way out, or without stiffness yet
+    raise_hinges(found.table.numbers)
+    far = abs(found.zones.nodes - 5.0)
+    assert zones.wanted[far < 0.59].min() == np.inf and zones.wanted[far > 0.61].max() == 0.0
+
+
+def test_the_shortest_cell_shows_a_sharp_layer_within_its_share() -> None:
+    """Of kappa exp(-s/l0) with l0 = 0.2 m, which turns by less than half a radian; no shorter than that needs."""
+    kinds, kappa = followed(along(), 0.02).manager.zones.kinds, 2.0
+    share = 0.01 * kappa
+    limits = np.array([np.inf, np.inf, share, np.inf])
+    h = shortest(kinds, np.full(512, 50.0), kappa, limits)
+    x = np.linspace(0.0, h, 1001)
+    error = np.abs(np.interp(x, [0.0, h], kappa * np.exp([0.0, -h / 0.2])) - kappa * np.exp(-x / 0.2)).max()
+    assert 0.6 < error / share < 1.0
+
+
+def test_a_kink_is_seen_from_three_nodes_beside_it() -> None:
+    kinds, bend, out = followed(along(), 0.02).manager.zones.kinds, np.zeros((513, 2)), np.zeros(513)
+    bend[:, cl.BENDS], bend[200, cl.KAPPA] = 1e12, 2.0
+    wanted_here(kinds, np.full(512, 50.0), bend, np.array([np.inf, np.inf, 0.02, np.inf]), out)
+    assert np.flatnonzero(out < 0.99 * out[100]).tolist() == list(range(197, 204))
+
+
+@pytest.mark.parametrize(("turn", "straight"), [(1e-5, False), (1e-7, True)])
+def test_a_line_that_turns_by_round_off_is_straight(turn: float, straight: bool) -> None:
+    found = followed(lambda s: np.column_stack([s, 0.0 * s, 0.05 * turn * s * s]), 0.02)
+    assert np.isinf(found.manager.zones.limits[CURVATURE]) == straight
+
+
 def test_runs_are_compared_by_their_fineness() -> None:
     """Base cells are as many at any fineness; where there are hardly any others a finer run is no finer."""
     zones = layout(np.linspace(0.0, 10.0, 21), 8, "R" * 20)
@@ -88,6 +174,87 @@ def test_contact_is_foreseen_where_its_edge_goes_in_a_ramp_time(speed: float, sh
     manager = DomainManager(what, zones, np.zeros(20, int), 1.0, Allowed(1.0, share), Times(2.0))
     manager.evaluate_criteria(line, sea, still(), state, 0.0)
     assert np.flatnonzero(manager.ratios[EDGE]).tolist() == list(raised)
+
+
+def running_edge() -> tuple[Any, Floats, Table]:
+    """Contact that begins at 52.1 m and goes up the line at 10 m/s; sqrt(EI/T) is 0.2 m: zones, nodes (m) and table."""
+    what, zones = cable(100.0), layout(np.linspace(0.0, 100.0, 201), 1, "R" * 200)
+    line = on(what, zones, SEABED)
+    sea = no_sea(line.h.size)._replace(normal=Z, offset=0.0, onset=0.0, stiffness=1e3)
+    state = state_on(line, lambda s: np.column_stack([s, 0.0 * s, 0.01 * (s - 52.1)]), 50.0)
+    state.v[:, 2] = -0.1
+    manager = DomainManager(what, zones, np.ones(200, int), 1.0, Allowed(1.0, 0.05), Times(2.0))
+    manager.evaluate_criteria(line, sea, still(), state, 0.0)
+    manager.zones.wanted[:] = np.inf
+    table = Table(blank_zone_job())
+    table.bind(line=line, sea=sea, ends=still(), new=state, zones=manager.zones)
+    return manager.zones, line.s, table
+
+
+def test_cells_are_made_no_further_than_thirty_lengths_of_bending_from_an_edge_that_runs() -> None:
+    zones, s, table = running_edge()
+    lower_edges(table.numbers, 10.0)
+    near = s[zones.wanted < 0.21]
+    assert 51.0 <= near[0] <= 51.5 and 58.5 <= near[-1] <= 59.2  # of 51.5 to 58.7 m and the nodes beside
+
+
+def test_cells_are_made_for_two_and_a_half_steps_of_an_edge() -> None:
+    """At 10 m/s and 0.2 s a step."""
+    zones, s, table = running_edge()
+    wanted_ahead(table.numbers, 0.2)
+    near = s[zones.wanted < 0.21]
+    assert 51.0 <= near[0] <= 51.5 and 57.5 <= near[-1] <= 58.2  # of 51.5 to 57.7 m
+
+
+def test_wanted_lengths_grow_by_four_fifths_of_the_way() -> None:
+    """So that cells beside each other differ by little more than 2."""
+    found = followed(along(), 0.02)
+    zones, s = found.manager.zones, found.zones.nodes
+    zones.wanted[:] = np.inf
+    zones.wanted[200] = 0.1
+    found.table.bind(sea=no_sea(512))
+    lower_edges(found.table.numbers, 0.0)
+    assert zones.wanted == pytest.approx(0.1 + 0.8 * abs(s - s[200]))
+
+
+def test_two_cells_become_one_when_four_plans_in_a_row_have_found_them_short() -> None:
+    found, count = followed(along(), 0.02), []
+    for _ in range(4):
+        plan_nodes(found.table.numbers)
+        count.append(int(found.manager.zones.plan.sum()))
+    assert count[:3] == [513] * 3 and count[3] < 513
+
+
+@pytest.mark.parametrize(("change", "steady"), [(0.019, True), (0.021, False)])
+def test_two_cells_become_one_where_curvature_changes_by_twice_its_error_at_most(change: float, steady: bool) -> None:
+    found = followed(along(), 0.02)
+    zones = found.manager.zones
+    zones.limits[CURVATURE], zones.moment[:] = 0.01, 0.0
+    zones.moment[12, cl.KAPPA] = change
+    assert is_steady(found.table.numbers, 10, 12) == steady
+
+
+def test_an_arc_is_longer_than_its_chord_and_comes_so_by_a_tenth_of_what_is_left_in_a_step() -> None:
+    """h^3 kappa^2/24 in a parabola, from cells that have none; none where the bend changes its side."""
+    middle, h, c = 5.0 + 5.0 / 512, 10.0 / 512, 256
+    for power, curvature in ((2, 0.1), (3, 0.0)):
+        found = followed(lambda s, n=power: np.column_stack([s, 0.0 * s, 0.05 * (s - middle) ** n]), 0.02)
+        zones = found.manager.zones
+        zones.true[:] = h
+        for part in (0.1, 0.19, 0.271):
+            relax_arcs(found.table.numbers)
+            assert h - zones.true[c] == pytest.approx(part * h**3 * curvature**2 / 24.0, rel=0.01, abs=1e-15)
+
+
+def test_a_layer_at_a_hinge_is_wrong_by_a_quarter_of_what_tension_changes_by() -> None:
+    """sqrt(EI/T) is 0.2 m, within which 50 N rise to 60."""
+    what, zones = cable(10.0), layout(np.linspace(0.0, 10.0, 1001), 1, "C" * 1000)
+    line = on(what, zones)
+    manager = DomainManager(what, zones, np.zeros(1000, int), 1.0, Allowed(1.0), Times(2.0))
+    kinds = manager.zones.kinds
+    kinds.turn[:] = 0.1 * line.hn
+    T = 50.0 + 25.0 * (line.s[1:] + line.s[:-1])
+    assert left_at_hinge(line, T, kinds) == pytest.approx(0.1 * 0.25 * 10.0 / 50.0, rel=0.1)
 
 
 @pytest.mark.parametrize("follows", [True, False])

@@ -14,6 +14,7 @@ from problems import pinned, scene
 from hybrid.kernels.junctions.joined_lines import TURNS
 from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.zone_criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.model.build import build
 from hybrid.model.mesh import Layout
 from hybrid.model.resolution import first_resolution
@@ -70,6 +71,13 @@ def test_what_becomes_rod_begins_without_stiffness_and_faster_where_it_is_urgent
         assert np.isinf(found.below_since[1]) and not found.leaving.any()
 
 
+def test_a_rod_begins_with_a_thousandth_of_its_stiffness() -> None:
+    """With none its cells could spin freely; more of it would be there at once."""
+    found = manager("RRRR")
+    found.grown[1:3] = 0.0
+    assert set(found.stiffness_shares().tolist()) == {1.0, 1e-3}
+
+
 def test_what_a_pre_run_foresees_begins_as_rod() -> None:
     """Ratios are all 0: cells 4 and 5 will lack twice what is allowed; without that there are none."""
     found = manager("CCCCCCCCCC")
@@ -114,7 +122,7 @@ def test_torque_asks_for_rods_from_end_to_end(why: str, first: bool) -> None:
         review_of(found)
     others = 3.0 if why else 0.0
     assert found.seen[TORSION].tolist() == [others] * 2 + [3.0] + [others] * 7
-    assert found.seen[GIVEN, 9] > 1.0 and not found.seen[GIVEN, :9].any()
+    assert 1.0 < found.seen[GIVEN, 9] < REJECT_RATIO and not found.seen[GIVEN, :9].any()
 
 
 def test_only_catenaries_that_are_far_above_a_threshold_reject_a_step() -> None:
@@ -160,6 +168,15 @@ def test_the_user_speaks_for_catenaries_that_may_be_rods() -> None:
         line = on(found.cable, found.layout)
         found.ask_user(line, state_on(line, along(), tension=1e6), 0.0)
         assert found.zones.clock.highest_ratio == highest_ratio
+
+
+def test_a_mask_of_the_user_asks_for_rods_and_repeats_no_step() -> None:
+    found = DomainManager(
+        cable(), even(10, "C" * 10), np.zeros(10, int), 1.0, Allowed(0.01), Times(HOLD), lambda nodes: nodes.s >= 0.0
+    )
+    line = on(found.cable, found.layout)
+    found.ask_user(line, state_on(line, along(), tension=1e6), 0.0)
+    assert 1.0 < found.zones.clock.highest_ratio < REJECT_RATIO
 
 
 def test_a_joint_is_passed_where_a_rod_grows_and_not_where_one_appears() -> None:

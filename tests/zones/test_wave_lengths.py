@@ -104,6 +104,14 @@ def test_finer_cells_are_shorter_in_waves_too() -> None:
     assert set(coarse) <= set(fine) and np.diff(coarse).min() == 2.0 * np.diff(fine).min()
 
 
+def test_lengths_that_waves_ask_for_have_bounds() -> None:
+    """No shorter than 1.2 sqrt(EI/T), whatever shakes; three base cells of 1.25 m at rest."""
+    shaken = watched(lambda s: (-1.0) ** np.arange(s.size))
+    assert after(shaken.manager, shaken.table, 50.0, 50)[1:-1].min() == pytest.approx(1.2**2 * 2.0 / 1e4)
+    still = watched(lambda s: 0.0 * s)
+    assert after(still.manager, still.table, 50.0, 50)[1:-1] == pytest.approx((3 * 1.25) ** 2)
+
+
 def test_a_line_at_rest_or_nearly_so_has_base_cells() -> None:
     """Vibrations far below what the tolerance allows in a ramp time are no waves to show."""
     for size in (0.0, 1e-8):
@@ -210,3 +218,11 @@ def test_waves_are_not_known_in_an_older_checkpoint() -> None:
     assert found["manager"]["fastest"] == 0.0 and not found["following"]["waves"].any()
     own = {"true": np.ones(3), "idle_steps": np.zeros(4), "waves": np.ones(4)}
     assert zoning_of_today({"manager": {"fastest": 2.0}, "following": own})["following"]["waves"].all()
+
+
+@pytest.mark.parametrize("part", [0.01, 0.1, 0.3, 0.5])
+def test_the_length_behind_a_hinge_is_right_to_a_sixth_on_the_safe_side(part: float) -> None:
+    x = np.linspace(1e-3, 10.0, 100_001)
+    m = -np.expm1(-x) / x
+    exact = x[np.searchsorted(1.0 - m + m * np.log(m), part)]
+    assert 0.84 < longest_behind_hinge(part) / exact <= 1.0
