@@ -275,29 +275,103 @@ BROKEN = {
     "constructor above 40 lines": 0,
     "function above 60 lines": 6,
     "fmt: skip": 4,
+    "first line of a docstring above 15 words": 3572,
+    "sentence with more than two relative clauses": 202,
+    "constructor that does work": 53,
+    "float constant without a comment": 22,
+    "two constants in a line": 226,
+    "argument, field or class named by a banned word": 628,
+}
+# The same of the pages of docs/.
+LONG_SENTENCES_OF_PAGES = 169
+# How a place is mended, where the name of the rule does not say it.
+MEND = {
+    "first line of a docstring above 15 words": "say what it returns or does; the rest goes below an empty line",
+    "sentence with more than two relative clauses": "make two sentences of it",
+    "constructor that does work": "loops, files and searches go to a function or class method that calls it",
+    "float constant without a comment": "unit and reason behind the number, or in the line above",
+    "two constants in a line": "one a line, each with unit and reason",
+    "argument, field or class named by a banned word": "the name of what it holds, in words of the field",
 }
 # Words that do not say what a thing is or does; the second ones only where they are the whole name.
 BANNED = {"calm", "follow", "found", "haste", "its", "look", "looks", "loudest", "pace", "patience", "said",
           "settle", "stir", "sure", "take", "takes", "tell", "tells", "told"}  # fmt: skip
 BANNED_ALONE = {"at", "go_on", "here", "own", "there", "whole"}
 CONSTANTS = re.compile(r"^[A-Z][A-Z0-9_]*(, [A-Z][A-Z0-9_]*){2,} = (?!range\()", re.MULTILINE)
+TWO_CONSTANTS = re.compile(r"^_?[A-Z][A-Z0-9_]*, _?[A-Z][A-Z0-9_]* = (?!range\()", re.MULTILINE)
+NOTES = re.compile(r"(?:^ *#.*\n)+|  #.*$", re.MULTILINE)  # comments; those in lines of their own are one text
+CLAUSE = re.compile(r"(?<=\w[ ,;(])\s*(which|that|who|whose|where|when)\b", re.IGNORECASE)
+WORK = re.compile(r"(open|run|solve|find|read|write)(_|$)")
+
+
+def long_sentences(text: str) -> int:
+    """Sentences with more than two relative clauses; lists, rows of tables and paragraphs are texts of their own."""
+    parts = re.split(r"(?<=[.?!:])\s+|\n\s*\n|\n\s*(?=[-*|#]|\d+\.)", text)
+    return sum(len(CLAUSE.findall(" ".join(part.split()))) > 2 for part in parts)
+
+
+def does_work(constructor: ast.FunctionDef) -> bool:
+    """Whether it loops, opens or tries something, searches, solves or reads, or calls what returns nothing."""
+    for node in ast.walk(constructor):
+        if isinstance(node, ast.For | ast.While | ast.With | ast.Try):
+            return True
+        call = node.value if isinstance(node, ast.Expr) else node
+        if isinstance(call, ast.Call):
+            name = ast.unparse(call.func)
+            if WORK.match(name.split(".")[-1]) or (call is not node and not name.endswith("__init__")):
+                return True
+    return False
+
+
+def unexplained(text: str, tree: ast.Module) -> int:
+    """Float constants of a module without a comment beside or above; zeros, ones and what is computed need none."""
+    lines, count = text.splitlines(), 0
+    for node in tree.body:
+        if not isinstance(node, ast.Assign) or not isinstance(
+            node.value, ast.Constant | ast.UnaryOp | ast.BinOp | ast.Tuple
+        ):
+            continue
+        named = re.match(r"_?[A-Z][A-Z0-9_]*$", ast.unparse(node.targets[0]).strip("()").split(",")[0])
+        numbers = [x.value for x in ast.walk(node.value) if isinstance(x, ast.Constant) and isinstance(x.value, float)]
+        beside = "#" in "".join(lines[node.lineno - 1 : node.end_lineno])
+        above = lines[node.lineno - 2].startswith("#") and node.lineno > 1
+        count += bool(named) and bool({*numbers} - {0.0, 1.0}) and not beside and not above
+    return count
+
+
+def banned_names(node: ast.AST) -> int:
+    """How many arguments of a function, fields of a class, or names of a class are banned."""
+    names = [node.name] if isinstance(node, ast.ClassDef) else []
+    if isinstance(node, ast.FunctionDef):
+        names = [x.arg for x in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+    if isinstance(node, ast.ClassDef):
+        names += [ast.unparse(x.target) for x in node.body if isinstance(x, ast.AnnAssign)]
+    return sum(name.strip("_").lower() in BANNED | {"given", "x"} for name in names)
 
 
 def broken_rules(text: str) -> Counter[str]:
     """In how many places a file breaks each of the rules of writing."""
     count = Counter({"more than two constants in a line": len(CONSTANTS.findall(text))})
     count["fmt: skip"] = len(re.findall("fmt: (?:skip|off)", text))
-    for node in ast.walk(ast.parse(text)):
+    count["two constants in a line"] = len(TWO_CONSTANTS.findall(text))
+    notes = [re.sub(r"^ *# ?", "", note, flags=re.MULTILINE) for note in NOTES.findall(text)]
+    count["float constant without a comment"] = unexplained(text, tree := ast.parse(text))
+    for node in ast.walk(tree):
+        count["argument, field or class named by a banned word"] += banned_names(node)
         if isinstance(node, ast.FunctionDef):
             size = (node.end_lineno or 0) - node.lineno + 1
             name = node.name.strip("_")
             banned = name in BANNED | BANNED_ALONE or name.split("_")[0] in BANNED
             count["constructor above 40 lines"] += node.name == "__init__" and size > 40
             count["function above 60 lines"] += size > 60
+            count["constructor that does work"] += node.name == "__init__" and does_work(node)
             count["name from the list of banned words"] += banned
         if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and (doc := ast.get_docstring(node)):
             whole = re.match(r".*[.?!]\s*(\n\n|\n?\Z)", doc)
             count["docstring whose first line is no whole sentence"] += not whole
+            count["first line of a docstring above 15 words"] += len(doc.partition("\n")[0].split()) > 15
+            notes.append(doc)
+    count["sentence with more than two relative clauses"] = sum(map(long_sentences, notes))
     return count
 
 
@@ -305,9 +379,19 @@ def test_rules_of_writing_are_broken_in_fewer_places() -> None:
     found = {file.relative_to(PACKAGE).as_posix(): broken_rules(file.read_text(encoding="utf-8")) for file in FILES}
     count = sum(found.values(), Counter())
     where = {x: {file: n[x] for file, n in found.items() if n[x]} for x in BROKEN if count[x] > BROKEN[x]}
-    assert not where, "more than there were: find the file of your change among these"
+    mend = "; ".join(f"{x} ({count[x]}, at most {BROKEN[x]}): {MEND.get(x, x)}" for x in where)
+    assert not where, f"more than there were: find the file of your change among these; {mend}"
     wrong = 'A, B, C = 1, 2, 3\nD, E, F = range(3)\nclass X:\n    """One\n    sentence."""\n'
-    assert +broken_rules(wrong + "    def take_x(self): ...\n") == Counter([*BROKEN][:3])
+    wrong += f'    def take_x(self):\n        """{"Word " * 16}."""\n    def __init__(self, told): self.find()\n'
+    wrong += "# A rod that bends where it stands\n# when it is one that moves.\nG, H = 1, 2\nI = 0.5\n"
+    assert +broken_rules(wrong) == Counter([*BROKEN][:3] + [*BROKEN][6:]) + Counter([[*BROKEN][-1]])
+
+
+def test_sentences_of_pages_are_short() -> None:
+    pages = {x.name: x.read_text(encoding="utf-8") for x in (PACKAGE.parent / "docs").rglob("*.md")}
+    count = {name: long_sentences(re.sub(r"(?ms)^ *```.*?^ *```", "", text)) for name, text in pages.items()}
+    worst = sorted(count.items(), key=lambda x: -x[1])[:9]
+    assert sum(count.values()) <= LONG_SENTENCES_OF_PAGES, f"{sum(count.values())}: make two sentences of one; {worst}"
 
 
 def test_only_the_command_line_prints() -> None:

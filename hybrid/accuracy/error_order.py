@@ -28,8 +28,8 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample, beyond_outputs, 
 # 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.5 it
 # is most often the coarsest run that is too coarse to say: errors are bounded, however coarse a run.
 ORDER = 1.5
-ORDERS = (ORDER, 2.0)
-MOST_ORDER = 3.0
+ORDERS = (ORDER, 2.0)  # bounds of a run from rest; 2 is that of a smooth motion
+MOST_ORDER = 3.0  # the largest that three runs may show
 # The same of forces at the ends where a motion begins from what is no equilibrium.  At its first output the half cell
 # at a held end bears the load that the line beside it falls with, w h/2, which is of order 1; and the waves that begin
 # there have all lengths, of which finer cells carry shorter ones (docs/errors.md): more than ORDER is shown by runs

@@ -293,7 +293,7 @@ def _grown(network: Network) -> float:
 
 # s of processor time (bench/test_bench_plan.py).
 CELL = 1e-6  # in a step
-OUTPUT = 0.06e-3
+OUTPUT = 0.06e-3  # of an output, whatever its points
 POINT = 0.6e-6  # of an output
 # Of the steps of the first result, what the runs to compare with take, and, on average, the finer results.
 COMPARISONS, FINER = 0.9, 0.5

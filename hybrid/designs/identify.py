@@ -212,7 +212,8 @@ PART, ALIKE = 0.05, 0.03
 SINGULAR = 1e-6  # singular values, as parts of the largest, that are 0
 LEAST = 1e-4  # where no deviation is stated, part of the largest number below which unknowns stay
 GAIN = 1e-7  # part of the sum of squares that is worth a step
-CONFIDENCE, DOUBT = 0.95, 0.005
+CONFIDENCE = 0.95  # of the intervals of estimates
+DOUBT = 0.005  # probability below which deviations as large, or as alike, are no chance
 # Readings one after another from which on it is judged whether they are independent.
 FEWEST = 8
 

@@ -33,7 +33,7 @@ PART = re.compile(r"[^.\[\]]+")
 # Lengths are changed by less: a place that is at a node would see the cell to one side of it as much as that to the
 # other.  So are diameters, on which it depends how deep a line lies in obstacles.
 OF_NUMBER = 1e-4
-OF_LENGTH = 1e-5
+OF_LENGTH = 1e-5  # of a length or diameter
 LENGTH = re.compile(r"\b(length|diameter)$")
 # Coordinates: what they are depends on where the origin is.  Where the bed and obstacles are counts in parts of how
 # deep a line lies in them: they are changed by this part, coordinates by this part of the longest line.
@@ -41,7 +41,7 @@ PLACE = re.compile(r"(position\[\d\]|centre\[\d\]|\.z|\.surface|\.at\[\d\]|\.dep
 TOUCHED = re.compile(
     r"^(obstacles|environment\.seabed|bodies\.[^.]+\.shape)\.(?!.*(stiffness|damping|friction|soil))|\.surface$"
 )
-OF_TOUCHED = 3e-8
+OF_TOUCHED = 3e-8  # of the number, or of the longest line for a coordinate
 # What runs, and equilibria far apart, differ by parts of: of coordinates this part of the longest line, of angles (deg)
 # at least a radian.
 PART_OF_LENGTH, RADIAN = 0.1, math.degrees(1.0)

@@ -27,8 +27,8 @@ DENSE = 2
 # have the same.  What is left of a mode in the next block, and of a vector that the blocks before have all of, of the
 # largest 1/(w^2 - shift).
 BLOCK = 3
-BLOCK_LEFT = 1e-13
-SPENT = 1e-12
+BLOCK_LEFT = 1e-13  # of the largest 1/(w^2 - shift): modes have converged
+SPENT = 1e-12  # of the same: a vector of a block adds nothing to those before
 # Of a new vector, how much is left of it beside those before, at least.
 OWN = 0.5
 SHIFTS = 4  # that are tried,

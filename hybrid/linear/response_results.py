@@ -32,8 +32,8 @@ FAR = 30.0
 # Values and weights of a normal law that show the kink of drag; standard deviations from which on the size of a bend is
 # its part in the plane of the bend at rest.
 LAW = np.linspace(-6.0, 6.0, 121)
-LAW_PARTS = np.exp(-0.5 * LAW**2) / np.exp(-0.5 * LAW**2).sum()
-BENT = 8.0
+LAW_PARTS = np.exp(-0.5 * LAW**2) / np.exp(-0.5 * LAW**2).sum()  # weights, of sum 1
+BENT = 8.0  # standard deviations
 FEW = 10  # frequencies up to which a sum is no normal process
 MULTIPLES = 40  # highest harmonic of one frequency up to which a sum is sampled over its period
 MULTIPLE = 1e-6  # part within which a frequency is such a harmonic
@@ -209,7 +209,7 @@ def shape_of_drag(mean: Floats, deviation: Floats, left_out: Floats, flow: Float
     return out
 
 
-HOURS = 3.0
+HOURS = 3.0  # h: the usual sea state, for which extremes and damage are given unless asked otherwise
 # Part of the largest deviation along a line from which one is known: below it what goes with the square of the motion,
 # which is left out, may be several times as much.
 OF_LARGEST = 0.2

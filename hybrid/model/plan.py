@@ -258,12 +258,12 @@ MORE_OF_RODS = {ROTARY: (0.025e-6, 0.005e-6)}
 COST_WAVE = 10e-9
 # s, whatever the cells.
 COST_RUN = 0.02
-COST_STEP = 12e-6
-COST_OUTPUT = 0.1e-3
+COST_STEP = 12e-6  # of a step
+COST_OUTPUT = 0.1e-3  # of an output
 # s of a step of zones that move, and of each of their cells: criteria, and the joints of a rod.
 COST_MANAGER, COST_CRITERIA = 3e-6, 0.03e-6
 COST_AS_RODS = 0.23e-6  # s per cell and step, of rods beside catenaries: by what choices of 1.0 were tried
-USUAL_ITERATIONS = 2.1
+USUAL_ITERATIONS = 2.1  # of Newton's method in a step
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
 # Moments at which the motion of the ends is evaluated to foretell its steps.
@@ -382,7 +382,8 @@ class Plan:
     ledger = renamed("ledger", "contents")
 
 
-MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
+MOST_OUTPUTS = 1_000_000  # of a run
+MOST_STEPS = 1e12  # of a run: some months of computing
 MOST_BYTES = 1e11  # of the largest file that still fits a disk
 SAME_STOP = 1e-6  # of a step: stops that are so near to each other are one, or a step between them would be round-off
 

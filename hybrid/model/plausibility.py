@@ -53,7 +53,7 @@ SHORTEST_BORNE = 5.0
 STRAINED = 0.01
 DENSEST_FIBRE = 1500.0  # kg/m^3
 FAST_WAVE = 1000.0  # m/s
-LONGEST_BORNE = 200e3
+LONGEST_BORNE = 200e3  # m of its own length in air that a line may bear: no rope so light bears more
 # Diameters of the smallest bend: a line is bent by no less than half of one about itself; steel pipes bear 250 without
 # yielding, cables and umbilicals 5 to 60, and 5000 where it is in mm.
 SHARPEST, MILDEST = 0.5, 2000.0

@@ -324,7 +324,7 @@ class Motion(_Harmonics):
 # 0.5 % of an amplitude: what is found there is true all the same.
 PER_PERIOD = 48  # of a period
 MOST_TIMES = 4000  # of a run
-GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # golden section: its multiples modulo 1 are spread evenly, whatever their count
 
 
 def shift(motion: Motion | None, t: float) -> Triple:

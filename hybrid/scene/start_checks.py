@@ -342,7 +342,7 @@ Hung = Float | Clump | Swivel | Modules | Body
 # air is lighter than air: in sea water 8.2 kg/m^3, which an inflated lift bag exceeds (10), and 51 for a clump, which
 # is to weigh on the cable.  The most, in kg/m^3, is more than that of any metal (osmium, 22 600).
 LEAST_PART: dict[str, float] = {"float": 0.008, "modules": 0.008, "body": 0.008, "clump": 0.05, "swivel": 0.05}
-DENSEST = 25_000.0
+DENSEST = 25_000.0  # kg/m^3
 FOAM_TO_WATER = (20.0, 1000.0)  # kg/m^3, to which a corrected unit of what floats should lead
 # Slips of units: the key, the factor that corrects it, and what its value is then taken for.
 _SLIPS = (

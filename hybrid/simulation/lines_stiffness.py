@@ -38,8 +38,10 @@ VERTICAL = np.array([0.0, 0.0, 1.0])
 # Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
 # touch themselves or bodies, of the narrowest diameter, over a part of which contact stiffens, but no less than a part
 # of that.
-SMALL_SHIFT, SMALL_TURN = 2e-5, 2e-4
-OF_DIAMETER, LEAST_PART = 1e-3, 0.05
+SMALL_SHIFT = 2e-5  # of the longest line
+SMALL_TURN = 2e-4  # rad
+OF_DIAMETER = 1e-3  # of the narrowest diameter
+LEAST_PART = 0.05  # of SMALL_SHIFT and SMALL_TURN
 # Springs that hold a body while a force acts on it resist as it does itself, and at least as this part of the stiffest.
 LEAST_SPRING = 1e-3
 

@@ -41,8 +41,8 @@ from hybrid.solve.stepper import JoinedLine, LineFailed, NetworkState, hold_by_f
 MOST_NODES = 300  # of a line that is looked at for whether it passes through itself
 # Turns by which the link of a line between two clamps may change; and those by which an equilibrium without contact may
 # differ from its start, whose shape may have a writhe of its own.
-KEPT = 1e-3
-OF_SHAPE = 0.5
+KEPT = 1e-3  # turns
+OF_SHAPE = 0.5  # turns
 # Parts of a current by whose equilibria lines come to that in all of it.
 SLOWER = tuple(np.linspace(0.875, 0.0, 8).tolist())
 

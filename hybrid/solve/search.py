@@ -63,7 +63,7 @@ MOST_FALLS = 16
 # Parts of a current with which equilibria lead to that in still water: at once, else by and by; and with which one with
 # friction follows it up again where it is not found at once.
 STILLED = ((0.0,), (0.8, 0.6, 0.4, 0.2, 0.1, 0.0))
-GROWING = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
+GROWING = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)  # of the current, up again
 PULLED = "pulled tight against friction"
 LIMP = 1e-3  # part of the bending stiffness with which a continuation begins
 # What a balanced state may be and yet no equilibrium; the first is what a search that found none tells.

@@ -24,7 +24,7 @@ from hybrid.statistics.moments import checked, cycles_of, mean_over_time
 
 Floats = NDArray[np.float64]
 
-THREE_HOURS = 10800.0
+THREE_HOURS = 10800.0  # s
 # Fractile that is printed beside the most probable value, and the part of bootstrap values inside an interval.
 FRACTILE, CONFIDENCE = 0.9, 0.9
 # Bootstrap samples: a hundred lie beyond each end of an interval.
@@ -34,7 +34,7 @@ LEAST_PEAKS, LEAST_RECORDS = 20, 5
 # The threshold that is taken where none is given: this fractile of the peaks.  Of JONSWAP waves the most probable value
 # of three hours is then 3 % too large in the mean; with 0.8 it is 6 %, with 0.5 10 %.
 USUAL_THRESHOLD = 0.9
-EULER = 0.5772156649015329
+EULER = 0.5772156649015329  # Euler's constant: mean of the standard Gumbel law
 # Shapes of Weibull laws: with the smallest what is exceeded once in e^7 is 7^10 scales above the threshold, with the
 # largest all are alike.  Peaks of a regular motion, all alike but for one of its beginning, ask for less and more.
 LEAST_SHAPE, LARGEST_SHAPE = 0.1, 1e9

@@ -23,10 +23,10 @@ from hybrid.statistics.moments import Spectrum
 
 Floats = NDArray[np.float64]
 
-YEAR = 365.25 * 86400.0
+YEAR = 365.25 * 86400.0  # s
 # m: plate thickness to which S-N curves refer.
 REFERENCE_THICKNESS = 0.025
-LARGEST_SLOPE = 20.0
+LARGEST_SLOPE = 20.0  # m of a curve: a larger one is refused
 # Part by which zero crossings over peaks fall short of 1, below which Dirlik's parts are round-off.
 NARROW = 1e-6
 

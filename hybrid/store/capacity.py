@@ -299,8 +299,8 @@ E301, F201 = 0.0, 1.0  # kinds in a row
 MOST_HARDENING = 1.2  # largest alpha_c
 THICK = 15.0  # D/t up to which beta is BETA + q_h,
 THIN = 60.0  # and from which it is 0; linear between
-BETA = 0.4
-POISSON = 0.3
+BETA = 0.4  # beta of thick pipes without pressure
+POISSON = 0.3  # Poisson's ratio, of steel, in the elastic collapse pressure
 
 
 class Row(NamedTuple):

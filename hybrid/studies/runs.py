@@ -32,7 +32,7 @@ from hybrid.store.tables import DONE, FAILED, MISSED, OURS, Row
 
 # Accuracy, and part of the duration, of the run that loads the kernels before anything is timed.
 ROUGH = "10%"
-WARM_PART = 0.02
+WARM_PART = 0.02  # of the duration
 # Keys of a model that set the resolution: the study chooses these.
 FINENESS = ("kind", "tolerance", "rod_cell", "hold_time")
 COMPARED = ("position", "reaction_start", "reaction_end")

@@ -29,7 +29,7 @@ from hybrid.store.verdicts import section_limits
 from hybrid.studies.cases import scene_of
 
 Floats = np.ndarray
-HOUR = 3600.0
+HOUR = 3600.0  # s
 # What is kept where a study does not say: name, quantity, what of it.
 USUAL: dict[str, tuple[str, tuple[str, ...]]] = {
     "end_force_start": ("end_force_start", ("max", "min", "mean", "deviation")),
