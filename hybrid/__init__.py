@@ -13,6 +13,7 @@ Names are imported when first used, so that `import hybrid` costs nothing.
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -97,8 +98,6 @@ def __getattr__(name: str) -> Any:
 
         return version("hybrid-cable")
     if name in _FORMER:
-        import warnings
-
         warnings.warn(f"hybrid.{name} is now hybrid.{_FORMER[name]}", DeprecationWarning, stacklevel=2)
         return getattr(import_module("hybrid"), _FORMER[name])
     if name not in _HOME:
