@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import json
 import re
 import subprocess
@@ -507,3 +508,20 @@ def test_numbers_of_a_run_have_names() -> None:
     assert by_index("a = job.clock[NOW]\nb = clock.now\nc = self._counts[b.STEPS]") == [1, 3]
     found = {str(file.relative_to(PACKAGE)): by_index(file.read_text(encoding="utf-8")) for file in FILES}
     assert not {name: lines for name, lines in found.items() if lines}
+
+
+def test_each_constant_says_what_it_moves() -> None:
+    """A numeric constant of accuracy, model or simulation is in the rows of its module in docs/evidence/constants.md."""
+    page = (PACKAGE.parent / "docs" / "evidence" / "constants.md").read_text(encoding="utf-8")
+    for room in ("accuracy", "model", "simulation"):
+        rows = re.findall(
+            r"^\| `(\w+)` \| (.*) \|.*\|$", page.partition(f"## `{room}/`")[2].partition("\n## ")[0], re.M
+        )
+        for file in sorted((PACKAGE / room).glob("*.py")):
+            said = {name for module, text in rows if module == file.stem for name in re.findall(r"`(\w+)`", text)}
+            module = importlib.import_module(f"hybrid.{room}.{file.stem}")
+            assigned = [x for x in ast.parse(file.read_text("utf-8")).body if isinstance(x, ast.Assign)]
+            names = {y.id for x in assigned for t in x.targets for y in ast.walk(t) if isinstance(y, ast.Name)}
+            values = {x: getattr(module, x) for x in names if x.isupper()}
+            numbers = {x for x, v in values.items() if isinstance(v, int | float) and not isinstance(v, bool)}
+            assert said == numbers, f"{room}/{file.name}: {said ^ numbers}"
