@@ -87,7 +87,7 @@ class NodeChanges(Remesh):
         """Whether nodes of a line can enter and leave so in a run whose solver is attached."""
         model, line = run.model.models[number], run.lines[number]
         stays = model.layout is None and line.paying is not None and not line.paying.ended
-        return stays and steps_alone(run, number) and not model.line.torsion.size
+        return stays and steps_alone(run, number) and not (model.line.torsion.size or model.line.moved.size)
 
     def change(self) -> None:
         """A node enters or leaves now."""

@@ -7,9 +7,9 @@ of the run get the numbers of the other one.  What Python has of the line is mad
 (`sync`). A planner derives from `Remesh`: cells that follow with kinds of cells (simulation.cell_changes), and nodes
 at a winch (simulation.payout_nodes).
 
-Where more than steps and watches knows of the cells (lines that touch, torque through zones, winches with zones) a
-change is made once, by the same parts (`carry_out`), from what the run has to arrays of their own, and another solver
-follows.
+Where more than steps and watches knows of the cells (lines that touch, torque through zones, winches with zones or
+beside obstacles that move) a change is made once, by the same parts (`carry_out`), from what the run has to arrays of
+their own, and another solver follows.
 """
 
 from __future__ import annotations
