@@ -394,7 +394,7 @@ class PayingOut:
             raise ValueError("a length that no winch gives")
         if (
             not np.searchsorted(self.plan.nodes, self.plan.shortest - self.plan.layer[0] - ROUND_OFF * model.length)
-            < count
+            <= count
             < self.plan.nodes.size - 1
         ):
             raise ValueError(f"{count} nodes, of a line that has {self.plan.nodes.size} at most")

@@ -301,7 +301,7 @@ class Remesh:
         self._pushes, self._kept = self._sides(of_pushes, None), self._sides(kept_of(marked), self._line.books)
         self._sea = self._sides(seas_with(sea.grip.shape[1], len(sea.rolling)), sea, one=True)
         self._work = self._sides(Packed(run.solver.room_beside(number, twice), given=("torsion",)), None, one=True)
-        self._base = np.zeros(self._line.books.base.size, np.int64)
+        self._base = self._line.books.base.copy()
         self._watch_table = None if once else self._line.watch_table  # None: nobody watches how near it comes to itself
         self._watch = None if once else watch_beside(self._line)
         width = np.zeros(most) if self._watch is None else self._watch.width_of(number)

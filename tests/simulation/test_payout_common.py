@@ -53,6 +53,21 @@ def of_winch(model: str, duration: float = 20.0, step: float = 0.05) -> Tables:
     return winch.clamped(scene, [1.0, 0.0, 0.5]) if model == "clamped" else scene
 
 
+def nearly_in() -> Tables:
+    """12 m in cells of 1 m behind a clamp, taken in to 11.03 m, where no cell more may leave, and out again."""
+    scene = clamped(sagging("rod", 1e5, 20.0, step=0.025, duration=3.0))
+    scene["cable"]["sections"][0] |= {"length": 12.0, "mass": 2.0, "damping": {"mass": 0.5}}
+    scene["ends"]["end"] |= {
+        "position": [10, 0, 3],
+        "payout": {"rates": [[0, 0], [0.5, -0.9], [1.0, -0.9], [1.8, 0.9], [3, 0.5]]},
+    }
+    return scene | {
+        "output": {"every": 0.1},
+        "mesh": {"cells": 12},
+        "model": {"kind": "adaptive", "curvature_error": 0.03, "hold_time": 0.1},
+    }
+
+
 def follows() -> Tables:
     model = cells.FOLLOWING | {"force_rod": [[0, 100]], "rod_cell": 0.6}
     return clamped(sagging("rod", 2e6, 2e4) | {"model": model})
@@ -300,6 +315,7 @@ RESUMED: dict[str, tuple[Tables, tuple[float, ...]]] = {
     "cells that follow": (zones.touching(0.8, cells.FOLLOWING), (2.0, 4.5)),
     "cells that follow, taken in": (cells.pinned(-0.8), (2.0, 4.5)),
     "tension at the start": (exchanged(of_winch("catenary", 6.0, 0.1)), (4.0,)),
+    "to the shortest and back": (nearly_in(), (0.9,)),
     "winch of a load": (winch.lowered(model="adaptive"), (4.0,)),
     "crane": (crane(), (3.0,)), "buoy": (to_a_buoy(-0.8), (5.0,)),
 }  # fmt: skip

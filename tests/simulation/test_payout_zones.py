@@ -13,6 +13,7 @@ from test_payout_laws import ROPE, TABLE
 
 import hybrid
 from tests.combinations.pairs import scene_of, seen_by
+from tests.inside import OnlyLine
 from tests.scenes import cable_scene, clamped_at, pinned_at
 
 ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0}
@@ -48,6 +49,16 @@ def stretching(law: dict[str, Any], rate: float, model: Any = ADAPTIVE) -> dict[
 
 
 LAWS = {"plain": {"axial_stiffness": 2e6}, "table": TABLE, "rope": ROPE, "damped": DAMPED}
+
+
+def test_how_far_base_nodes_have_moved_goes_on_as_nodes_enter() -> None:
+    """As the event `coarse step` weighs it: in a step, not from the first node."""
+    moved = []
+    for model in ("rod", {"kind": "adaptive", "force_rod": [[0, 100]]}):
+        with hybrid.Simulation(sagging("rod", 2e6, 2e4, duration=8.0) | {"model": model}) as sim:
+            sim.advance(7.9)
+            moved.append(float(OnlyLine(sim).books.clock.moved))
+    assert moved[1] == pytest.approx(moved[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("rate", [0.8, -0.8])

@@ -93,6 +93,9 @@ def length_at(law, t):
     return value, rate, twice
 
 
+EDGE = 1e-12  # of a cell: a piece that ends so near to a node ends there, but for rounding
+
+
 @inner
 def made_between(pieces, begin, end, out, row):
     """The row of the material between two arc lengths: the mean of its pieces; of stiffness that of their compliances."""
@@ -103,6 +106,9 @@ def made_between(pieces, begin, end, out, row):
         if not z > a:
             continue
         part = (z - a) / (end - begin)
+        if part < EDGE:
+            continue
+        part = 1.0 if part > 1.0 - EDGE else part
         for j in range(COLUMNS):
             x = pieces[k, 1 + j]
             if part == 1.0:
@@ -175,15 +181,16 @@ def fill_table(line, i, half):
 @inner
 def fill_between(line, reel, i, a, ha, b, hb):
     """Node i between cells of rows a and b of `reel.made`; lengths: as of kernels.mesh.remesh.fill_node."""
+    if reel.numbers.side < 0.0:  # in the order of the line, or sums of two products are rounded otherwise
+        a, ha, b, hb = b, hb, a, ha
     fill_node(line, i, reel.made, a, ha, b, hb)
     if line.element[i]:
         fill_element(line, i, reel.made, a, ha, b, hb, line.kb[i, 2] == 0.0)
         if line.bits & BENDING_LAW:
             fill_table(line, i, 0.5 * (ha + hb))
     if line.bits & VORTICES:
-        before, after = (ha, hb) if reel.numbers.side > 0.0 else (hb, ha)
         half = 0.5 * reel.numbers.lift
-        line.wake_law[i, LIFT_A], line.wake_law[i, LIFT_B] = half * before, half * after
+        line.wake_law[i, LIFT_A], line.wake_law[i, LIFT_B] = half * ha, half * hb
 
 
 @inner
