@@ -68,6 +68,17 @@ def nearly_in() -> Tables:
     }
 
 
+def of_sections() -> Tables:
+    """From a winch at the start, in cells of 100/41 m: 0.7 m of a heavier section, and another one."""
+    scene = exchanged(sagging(duration=9.0)) | {"mesh": {"cells": 41}}
+    (own,) = scene["cable"]["sections"]
+    scene["ends"]["start"]["payout"]["reel"] = [
+        own | {"length": 0.7, "mass": 1.5 * own["mass"]},
+        own | {"length": 60.0},
+    ]
+    return scene
+
+
 def follows() -> Tables:
     model = cells.FOLLOWING | {"force_rod": [[0, 100]], "rod_cell": 0.6}
     return clamped(sagging("rod", 2e6, 2e4) | {"model": model})
@@ -316,6 +327,7 @@ RESUMED: dict[str, tuple[Tables, tuple[float, ...]]] = {
     "cells that follow, taken in": (cells.pinned(-0.8), (2.0, 4.5)),
     "tension at the start": (exchanged(of_winch("catenary", 6.0, 0.1)), (4.0,)),
     "to the shortest and back": (nearly_in(), (0.9,)),
+    "sections from the start": (of_sections(), (7.0,)),
     "winch of a load": (winch.lowered(model="adaptive"), (4.0,)),
     "crane": (crane(), (3.0,)), "buoy": (to_a_buoy(-0.8), (5.0,)),
 }  # fmt: skip
