@@ -235,7 +235,8 @@ class RunZones(Part):
         for x in self.lines:
             layout, switching = x.switching.manager.layout, x.switching.checkpoint()
             name = self._run.lines[x.number].name
-            found[name] = {"rod": layout.rod.copy(), "here": layout.here, "switching": switching}
+            here = layout.here if x.paid is None else None  # a winch keeps the cells of its line
+            found[name] = {"rod": layout.rod.copy(), "here": here, "switching": switching}
         return {"zones": found}
 
     def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
@@ -243,7 +244,8 @@ class RunZones(Part):
         zones = saved.get("zones", {})
         if not (isinstance(zones, dict) and all(isinstance(x, dict) for x in zones.values())):
             return {"zones": zones}
-        found = {name: {"here": None} | x for name, x in zones.items()}
+        paid = {self._run.lines[x.number].name for x in self.lines if x.paid is not None}
+        found = {name: {"here": None} | x | ({"here": None} if name in paid else {}) for name, x in zones.items()}
         for x in found.values():
             if isinstance(x.get("switching"), dict):
                 x["switching"] = zoning_of_today(x["switching"])

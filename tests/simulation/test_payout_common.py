@@ -325,6 +325,7 @@ RESUMED: dict[str, tuple[Tables, tuple[float, ...]]] = {
     # Cells have just been handed over by the winch, or are merged on their way to it.
     "cells that follow": (zones.touching(0.8, cells.FOLLOWING), (2.0, 4.5)),
     "cells that follow, taken in": (cells.pinned(-0.8), (2.0, 4.5)),
+    "cells that follow, before they change": (zones.touching(0.8, cells.FOLLOWING) | {"output": {"every": 0.1}}, (0.1,)),
     "tension at the start": (exchanged(of_winch("catenary", 6.0, 0.1)), (4.0,)),
     "to the shortest and back": (nearly_in(), (0.9,)),
     "sections from the start": (of_sections(), (7.0,)),
