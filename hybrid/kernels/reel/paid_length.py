@@ -582,9 +582,9 @@ def stop_flow(line, reel):
 
 @kernel
 def carry_layers(line, target, state, out, reel, new):
-    """p on the volumes of a line (target) that a node has entered or left, near the fairlead; its layers stick.
+    """p on the volumes of a line (target) that a node has entered or left, near the fairlead; layers stick.
 
-    state, reel: of the line before.
+    state, reel: of the line before, whose layers stick too: its energy is that of the state, whoever looked at it last.
     """
     g, m, columns = growing(line, reel), target.h.shape[0], state.layers.shape[1]
     first = max(g - BEFORE, 1)
@@ -595,6 +595,8 @@ def carry_layers(line, target, state, out, reel, new):
             begin, end = begins_at(target, new, k), begins_at(target, new, k + 1)
             for j in range(columns):
                 out.layers[i, j] = mean_between(reel, begin, end, first, j)
+    for i in range(line.h.shape[0] + 1):
+        stick(line, state, i)
     for i in range(m + 1):
         stick(target, out, i)
 
