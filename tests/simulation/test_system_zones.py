@@ -257,7 +257,7 @@ def cells(line: hybrid.Result) -> list[int]:
 def test_cells_change_without_python_as_with_it(model: Tables, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a line that is joined to nothing that moves: steps go on through changes, and outputs of all cells wait."""
     tables = yaml.safe_load(TOUCHDOWN.read_text()) | {
-        "model": model, "mesh": {"cells": 24}, "time": {"duration": 8.0, "step": 0.1}, "output": {"every": 0.1},
+        "model": model, "mesh": {"cells": 24}, "time": {"duration": 10.0, "step": 0.1}, "output": {"every": 0.1},
     }  # fmt: skip
     calls = calls_of(monkeypatch, NetworkSteps, "go")
     whole = hybrid.run(said(tables, network=True))
