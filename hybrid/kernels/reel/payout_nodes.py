@@ -25,7 +25,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader, rows
 from hybrid.kernels.march.energies import Observed
 from hybrid.kernels.mesh.cell_changes import begin_anew, energy_in, make_stiffness
-from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces
+from hybrid.kernels.mesh.remesh import AFTER, BEFORE, COMPLIANCE, RemeshPlaces, came_from
 from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.mesh.zone_transfer import put3
 from hybrid.kernels.reel.paid_length import (
@@ -45,7 +45,7 @@ from hybrid.kernels.reel.paid_length import (
     prepare,
 )
 from hybrid.kernels.reel.payout import chord_at, left_behind, way_at
-from hybrid.kernels.reel.payout_work import leave_to_reel, put_travels, strain_at
+from hybrid.kernels.reel.payout_work import put_travels, strain_at
 from hybrid.kernels.reel.reel import ENTERS, FEWEST_STEPS, LEAVES, Reel, Winch, at_its_end
 from hybrid.kernels.state.books import Books, Clock
 from hybrid.kernels.state.report import PLANAR, STIFFNESS_DAMPING
@@ -595,20 +595,17 @@ def carry_zones(table):
     job = read_zones(table)
     zones, out, reel, n, m = job.zones, job.out, job.reel, job.line.h.shape[0], job.target.h.shape[0]
     forward, step, cut = reel.numbers.side > 0.0, m - n, min(n, m) - reel.layer.shape[0]
-    for old, new in ((zones.past, out.past), (zones.recent, out.recent), (zones.lengths, out.lengths)):
-        move_row(old, new, forward, cut, step)
-    for old, new in ((zones.true, out.true), (zones.lack, out.lack), (zones.rate, out.rate), (zones.since, out.since)):
-        move_row(old, new, forward, cut, step)
-    move_row(zones.keeps, out.keeps, forward, cut, step)
-    move_rows(zones.stiff, out.stiff, forward, cut + 1, step)
-    for c in range(m):
+    for k in range(m):
+        c, a = came_from(k, n, m, forward, cut, step)
+        out.past[c], out.recent[c], out.lengths[c] = zones.past[a], zones.recent[a], zones.lengths[a]
+        out.true[c], out.lack[c], out.rate[c] = zones.true[a], zones.lack[a], zones.rate[a]
+        out.since[c], out.keeps[c] = zones.since[a], zones.keeps[a]
         if changes_length(job.target, reel, c):
-            out.true[c] = reel.true[cell(job.target, reel, c)]
-    for k in range(cut, m + 1):  # they have all of their stiffness, as those behind them
-        i = node(job.target, reel, k)
+            out.true[c], out.lengths[c] = reel.true[cell(job.target, reel, c)], job.target.h[c]
+    for k in range(m + 1):  # from the cell that is now complete on they have all of their stiffness
+        i, a = came_from(k, n + 1, m + 1, forward, cut + 1, step)
         for j in range(3):
-            out.stiff[i, j] = job.target.kb[i, j]
-    leave_to_reel(job.target, out, reel)
+            out.stiff[i, j] = job.target.kb[i, j] if k >= cut else zones.stiff[a, j]
     make_stiffness(job.target, out)
 
 
