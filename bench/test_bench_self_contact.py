@@ -16,7 +16,14 @@ import pytest
 import hybrid
 from hybrid.kernels.contact.self_contact import contact_task
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.step.line_step import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
+from hybrid.kernels.step.line_step import (
+    ACCEPT,
+    ASKED,
+    COUPLE,
+    JUDGE,
+    PREDICT,
+    SAFE_PART,
+)
 from tests.inside import OnlyLine
 
 pytestmark = pytest.mark.bench
@@ -199,7 +206,7 @@ def test_search_for_contact_that_is_not_there(shape: str) -> None:
             whole = (time.process_time() - begin) / (line.steps - before)
             assert contact.contact.counts.points == 0
             found, balance = 0.0, 0.0
-            for what, times in ((PREPARE, 1.0), (TOUCH, each), (LIMIT, each), (FINISH, 1.0), (GAIN, 0.0)):
+            for what, times in ((PREDICT, 1.0), (COUPLE, each), (SAFE_PART, each), (ACCEPT, 1.0), (JUDGE, 0.0)):
                 contact.call[ASKED], begin = what, time.process_time()
                 for _ in range(10 * count):
                     contact_task(contact._table)

@@ -567,9 +567,6 @@ def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, 
         line = RunLine(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))
         run.lines.append(line)
         line.manager = manager
-    if not first.resumed:
-        for line in run.lines:
-            line.diagnostics.begin()
 
 
 def start_of(network: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:

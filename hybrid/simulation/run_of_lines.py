@@ -376,6 +376,11 @@ class FirstStates(Part):
     def __init__(self, run: RunOfLines) -> None:
         self._run = run
 
+    def place(self) -> None:
+        """Note what the contents of the models warn of."""
+        for line in self._run.lines:
+            line.diagnostics.begin()
+
     def begin(self) -> None:
         """Note it of a start."""
         self._note(0.0)
@@ -385,6 +390,7 @@ class FirstStates(Part):
 
     def at_rest(self) -> None:
         """Note it of an equilibrium that is the result."""
+        self.place()
         for line, x in zip(self._run.lines, self._run.solver.lines, strict=True):
             line.held = x.ends.held
         self._note(None)

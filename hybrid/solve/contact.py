@@ -36,7 +36,13 @@ from hybrid.kernels.run.newton import block_rows, out_of_balance, workspace_of
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FORCE_A, NET_A, ROTARY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends, no_work
-from hybrid.kernels.step.line_step import ADDRESS, ASKED, NEAR, REST, SHARED
+from hybrid.kernels.step.line_step import (
+    ADDRESS,
+    ASKED,
+    NEAR,
+    SHARED,
+    STAND,
+)
 from hybrid.model.contents import Touching
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
@@ -231,7 +237,7 @@ class SelfContact(ContactBooks):
 
     def energy(self) -> float:
         """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
-        self.call[ASKED] = REST
+        self.call[ASKED] = STAND
         return contact_task(self._table)
 
     def energy_of(self, line: Line, ends: Ends, state: State) -> float:
@@ -396,7 +402,7 @@ class SharedContact(ContactBooks):
         """
         for k in self.lines:
             works[k].u[:] = 0.0
-        self.call[ASKED] = REST
+        self.call[ASKED] = STAND
         shared_task(self._jobs[0].numbers)
         numbers = self.contact.numbers
         return float(numbers.energy + (numbers.tried if self.contact.holds.size else 0.0))

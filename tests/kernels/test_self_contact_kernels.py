@@ -11,7 +11,12 @@ from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.run.newton import workspace
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import blank_line, blank_state, no_ends
-from hybrid.kernels.step.line_step import ASKED, LIMIT, PREPARE, REST
+from hybrid.kernels.step.line_step import (
+    ASKED,
+    PREDICT,
+    SAFE_PART,
+    STAND,
+)
 from hybrid.solve.contact import SelfContact
 
 WIDTH = 0.1
@@ -59,7 +64,7 @@ class Tangle:
     def energy(self, u: np.ndarray) -> float:
         """Energy (J) with the nodes displaced by u, m; the points of contact are then those."""
         self.work.u[:] = u
-        self.contact.call[ASKED] = REST
+        self.contact.call[ASKED] = STAND
         return k.contact_task(self.table)
 
     @property
@@ -76,14 +81,14 @@ class Tangle:
         """The safe part of a correction x (m)."""
         self.energy(np.zeros_like(self.r))
         self.work.x[:, 1:4] = x
-        self.contact.call[ASKED] = LIMIT
+        self.contact.call[ASKED] = SAFE_PART
         return k.contact_task(self.table)
 
     def speed(self, x: np.ndarray) -> float:
         """What is found in the limit of a correction x (m) of pieces that may come into contact, m."""
         self.states[0].v[:] = x
         self.clock.try_end, self.work.u[:] = 1.0, 0.0
-        self.contact.call[ASKED] = PREPARE
+        self.contact.call[ASKED] = PREDICT
         k.contact_task(self.table)
         return float(self.contact.contact.numbers.speed)
 

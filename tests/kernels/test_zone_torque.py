@@ -8,7 +8,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.march.energies import Observed, observe
 from hybrid.kernels.march.march import update
-from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, pass_torque
+from hybrid.kernels.march.zone_torque import REPORT, TORQUES, pass_torque
 from hybrid.kernels.run.newton import assembly, block_rows, correction, workspace, workspace_of
 from hybrid.kernels.state.report import AXIAL_LAW, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING, STRETCH_ENERGY
 from hybrid.kernels.state.state import NO_LAW, blank_state
@@ -86,8 +86,8 @@ def test_the_corrected_solution_solves_the_derivative_of_the_residual(name, bits
 def test_rate_of_the_turn(name):
     """By spins and by chords, against the difference of the turn over a short time in which all moves and ends turn."""
     line, _, ends, st, work = twisted_case(name, 0)
-    pass_torque(line, ends, st, work, BEFORE_MARCH, 0.0)
-    pass_torque(line, ends, st, work, AFTER_STEP, 0.0)
+    pass_torque(line, ends, st, work, TORQUES, 0.0)
+    pass_torque(line, ends, st, work, REPORT, 0.0)
     torque, power = st.turn[:, 1].copy(), st.turn[:, 2].copy()
     np.testing.assert_allclose(torque * line.torsion[:, 2], st.turn[:, 0] - 0.1, rtol=1e-12)
 
@@ -102,8 +102,8 @@ def test_rate_of_the_turn(name):
             K = np.cross(q / size, np.eye(3)).T if size else np.zeros((3, 3))
             turn = np.eye(3) + np.sin(size) * K + (1 - np.cos(size)) * K @ K
             e.frame[k] = (turn @ ends.frame[k].reshape(3, 3)).ravel()
-        pass_torque(line, e, s, moved, BEFORE_MARCH, 0.0)
-        pass_torque(line, e, s, moved, AFTER_STEP, 0.0)
+        pass_torque(line, e, s, moved, TORQUES, 0.0)
+        pass_torque(line, e, s, moved, REPORT, 0.0)
         return s.turn[:, 0]
 
     t = 1e-3
@@ -119,12 +119,12 @@ def test_rate_of_the_turn(name):
 def test_turns_are_counted_on():
     """A frame that goes round and round, a quarter at a time, ten times."""
     line, _, ends, st, work = twisted_case("between rods", 0)
-    pass_torque(line, ends, st, work, BEFORE_MARCH, 0.0)
+    pass_torque(line, ends, st, work, TORQUES, 0.0)
     first = st.turn[0, 0]
     d = st.e[5] / np.linalg.norm(st.e[5])
     for _ in range(40):
         st.a1[5] = np.cross(d, st.a1[5])
-        pass_torque(line, ends, st, work, BEFORE_MARCH, 0.0)
+        pass_torque(line, ends, st, work, TORQUES, 0.0)
     assert st.turn[0, 0] - first == pytest.approx(20.0 * np.pi, rel=1e-12)
 
 

@@ -1,9 +1,9 @@
 """Contact of a line with itself in a step: near pairs, limits of corrections, forces and friction.
 
 A step that puts energy in for which no work accounts is repeated.  A run calls `contact_task` by its address, so that
-lines without self-contact compile none of it: before a try of a step (PREPARE), to shorten what Newton's method
-predicts and corrects so that no two strands pass through each other (LIMIT), to put the forces of contact into a
-correction (TOUCH), and for the energy at the end (FINISH).
+lines without self-contact compile none of it: before a try of a step (PREDICT), to shorten what Newton's method
+predicts and corrects so that no two strands pass through each other (SAFE_PART), to put the forces of contact into a
+correction (COUPLE), and for the energy at the end (ACCEPT).
 
 Contact couples nodes that are no neighbours, which the block rows along s do not know.  It is added to their solution
 x0 with the kept factors of the matrix A: (A - H) x = b + g is x = A^-1 b + A^-1 (g + H x), of which only the nodes in
@@ -77,7 +77,18 @@ from hybrid.kernels.state.report import (
     TOUCHES,
 )
 from hybrid.kernels.state.state import Ends, Line, Rows, State, Work, blanks
-from hybrid.kernels.step.line_step import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
+from hybrid.kernels.step.line_step import (
+    ACCEPT,
+    ASKED,
+    COUPLE,
+    FIND,
+    JUDGE,
+    NEAR,
+    PREDICT,
+    RADIUS,
+    SAFE_PART,
+    STAND,
+)
 from hybrid.kernels.step.step_control import before_fixed, radius_of_step, scheme
 
 # --- a correction of Newton's method -----------------------------------------------------------
@@ -612,18 +623,18 @@ def push_ends(contact, n):
 def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
 
-    PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails; FIND: points of contact
+    PREDICT, SAFE_PART: the part of the prediction, of the correction work.x, that is safe; COUPLE: 1, or 0 where it fails; FIND: points of contact
     alone, which kernels.junctions.lines_contact solves for;
-    RADIUS: the spectral radius of the step; GAIN: 1 where the try has put energy in and has to be repeated in halves,
-    else 0; FINISH, and REST, where no step is tried: the energy of contact, J.
+    RADIUS: the spectral radius of the step; JUDGE: 1 where the try has put energy in and has to be repeated in halves,
+    else 0; ACCEPT, and STAND, where no step is tried: the energy of contact, J.
     """
     job = read(table)
     line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
     old, new = (job.new, job.old) if job.counts.parity else (job.old, job.new)
     rubs, numbers = contact.numbers.friction > 0.0, contact.numbers
-    if rubs and phase in (PREPARE, REST):
+    if rubs and phase in (PREDICT, STAND):
         keep_last(contact, job.clock.now)
-    if phase == PREPARE:
+    if phase == PREDICT:
         near = prepare(line, ends, contact, old, work.u, job.clock.now, job.clock.try_end - job.clock.now)
         job.call[NEAR] = 1 if near else 0
         numbers.tries += 1.0
@@ -637,12 +648,12 @@ def contact_task(table):
                 clock.try_end - clock.now, clock.step_before, clock.rho_before, rho
             )
         return rho
-    if phase == GAIN:
+    if phase == JUDGE:
         if not puts_energy_in(line, ends, contact, job, job.clock, old, new, work):
             return 0.0
         numbers.quiet -= 1.0
         return 1.0
-    if phase == LIMIT:
+    if phase == SAFE_PART:
         speed = contact.numbers.speed
         for i in range(work.x.shape[0]):
             for k in range(3):
@@ -651,30 +662,30 @@ def contact_task(table):
         contact.numbers.speed = speed
         return contact.numbers.part
     place(contact, old, work.u)
-    if phase == REST:
+    if phase == STAND:
         numbers.keeps = -1.0
     find_points(line, ends, contact, farthest_from_mean(work.u))
     if rubs:
-        if phase == REST:
+        if phase == STAND:
             contact.x[:, :4] = 0.0
         else:
             find_spins(line, contact, job.clock, job.call[NEAR] != 0, old, new, work.u)
         hold_points(line, contact)
-    if phase == FINISH and rubs:
+    if phase == ACCEPT and rubs:
         keep_grips(line, contact, contact.counts.points)
         contact.counts.fresh, numbers.since = contact.counts.points, job.clock.try_end
         work.report[SELF_FRICTION_WORK] = numbers.slip_work + numbers.tried - numbers.stored
-    if numbers.horizon > 0.0 and phase in (FINISH, REST):
-        foresee_nearness(line, ends, contact, new.v if phase == FINISH else old.v)
-    if phase == FINISH:
+    if numbers.horizon > 0.0 and phase in (ACCEPT, STAND):
+        foresee_nearness(line, ends, contact, new.v if phase == ACCEPT else old.v)
+    if phase == ACCEPT:
         numbers.quiet += 1.0
         push_ends(contact, line.h.shape[0])
         load_ends(ends, contact.y, 0, line.h.shape[0], work.report)
-    if phase in (FINISH, REST):
-        press(line, contact, job.touch, 2 if phase == FINISH else 0)
+    if phase in (ACCEPT, STAND):
+        press(line, contact, job.touch, 2 if phase == ACCEPT else 0)
     if phase == FIND:
         return 1.0
-    if phase != TOUCH:
+    if phase != COUPLE:
         return numbers.energy + (numbers.tried if rubs else 0.0)
     charge(line, contact, job.counts)
     if contact.counts.overflow or (contact.counts.points > 0 and not solve_contact(ends, contact, work)):

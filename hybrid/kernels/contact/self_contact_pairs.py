@@ -47,7 +47,10 @@ from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.machine.references import NamedNumbers, by_reference
 from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.line_step import LIMIT, TOUCH
+from hybrid.kernels.step.line_step import (
+    COUPLE,
+    SAFE_PART,
+)
 
 WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
 SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
@@ -98,7 +101,7 @@ class ContactNumbers(NamedNumbers):
 # friction of a line on itself in the step.
 BETWEEN, WITHIN_LINE, HELD_BETWEEN, HELD_WITHIN, SLIP_WITHIN = range(5)
 SHARES = 5
-WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
+WATCH, COLLECT = -1, -2  # beside SAFE_PART and COUPLE: how near the line is to itself; keep pairs for all of a step
 
 
 class ContactCounts(NamedNumbers, number=np.int64):
@@ -431,7 +434,7 @@ def examine_pair(line, ends, contact, phase, p, q):
         keep_pair(contact, p, q, apart - OUTER * width)
     elif phase == WATCH:
         note_near(contact, p, q, width)
-    elif phase == LIMIT:
+    elif phase == SAFE_PART:
         moved = largest_difference(contact.move, p, q)
         if SAFE * (apart - INNER * width) < contact.numbers.part * moved:
             limit_part(line, ends, contact, p, q, width, moved)
@@ -522,7 +525,7 @@ def limit(line, ends, contact, gone):
     numbers, far = contact.numbers, farthest_from_mean(contact.move) / SAFE
     numbers.reach = OUTER * numbers.widest + 2.0 * far
     numbers.part = 1.0
-    examine_kept(line, ends, contact, LIMIT, gone + far)
+    examine_kept(line, ends, contact, SAFE_PART, gone + far)
 
 
 @inner
@@ -547,7 +550,7 @@ def find_points(line, ends, contact, gone):
     for l in range(contact.shares.shape[0]):
         contact.shares[l, BETWEEN], contact.shares[l, WITHIN_LINE] = 0.0, 0.0
     numbers.reach = OUTER * numbers.widest
-    examine_kept(line, ends, contact, TOUCH, gone)
+    examine_kept(line, ends, contact, COUPLE, gone)
     for k in range(counts.points):
         for of in (P, Q):
             p = int(contact.points[k, of])

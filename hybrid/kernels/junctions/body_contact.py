@@ -29,13 +29,6 @@ from hybrid.kernels.algebra.rotations import add, cross, get3, madd, mat_mat, ma
 from hybrid.kernels.algebra.sparse_rows import factor_dense, substitute_dense
 from hybrid.kernels.junctions.bodies import FRAME, LINES, PLACE, SOFTEST, SPRING, U, V, W, X, matrix
 from hybrid.kernels.junctions.borders import (
-    AGAIN,
-    BEFORE_MARCH,
-    BLOCK,
-    CARRY,
-    COUPLE,
-    FORCE,
-    HOLD,
     answer_right_sides,
     clear_right_side,
     eliminate_right_side,
@@ -64,7 +57,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.report import PLACE as CENTRE
 from hybrid.kernels.state.state import Blocks, Rows, blanks
-from hybrid.kernels.step.line_step import CORRECTION, read
+from hybrid.kernels.step.line_step import AGAIN, BEFORE_MARCH, BLOCK, CARRY, CORRECTION, COUPLE, FORCE, HOLD, read
 
 # Columns of a node that touches a body.
 OF_LINE = 0

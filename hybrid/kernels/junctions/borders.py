@@ -35,7 +35,7 @@ from hybrid.kernels.machine.references import NamedNumbers, caller, reader
 from hybrid.kernels.march.assembly import JOINED as AT_JUNCTION
 from hybrid.kernels.state.report import FREE, MEETS_FROM, MEETS_TO, ONSET_OF, PLACE, RADIUS, STRAND
 from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
-from hybrid.kernels.step.line_step import Limits, Task, read
+from hybrid.kernels.step.line_step import AGAIN, Limits, Task, read
 
 # --- what kernels of several lines get ---------------------------------------------------------
 
@@ -238,26 +238,6 @@ def is_grouped_otherwise(network):
 # --- borders -----------------------------------------------------------------------------------
 
 START, END = 0, 1
-# Questions, and what a border does then; it answers 1 where nothing else is said.
-# A step begins; answered by the part of its prediction that is safe.  `asked.rho_of_step` falls to the spectral radius that it
-# may have.
-PREDICT = 0
-FORGET = 1  # a solution begins: what was known of another one is found anew
-BEFORE_MARCH = 2  # what it carries goes to where its unknowns are
-FORCE = 3  # after the march: what lines and it do to points and bodies in this state
-BALANCE = 4  # what its own equations leave over, when all of that is known
-BLOCK = 5  # columns, functional and block that fall on points and bodies, into A
-HOLD = 6  # springs against what nothing else holds, in the first iteration of an equilibrium
-COUPLE = 7  # its part of the corrections of the iteration; 0: singular, or as below
-AGAIN = 8  # its part of other corrections of the iteration, which have no residual; 0: not finite
-MEASURE = 9  # the largest shift and turn of its unknowns, into `moves`
-SAFE_PART = 10  # answered by the part of the corrections that is safe
-UPDATE = 11  # its unknowns move by the part of the corrections that is made
-RELAX = 12  # springs of HOLD follow the turns
-CARRY = 13  # a solution has ended: what it carries goes to where that has led
-# Answers to COUPLE.
-NO_NUMBERS = -1.0  # corrections are not finite
-NO_SOLUTION = -2.0  # none were found in the iterations that there are
 # Places in `moves`.
 FAR = 0  # m, largest shift of unknowns
 TURNED = 1  # rad, largest turn

@@ -32,25 +32,13 @@ from hybrid.kernels.junctions.bodies import (
     size_of_moves,
 )
 from hybrid.kernels.junctions.borders import (
-    AGAIN,
-    BALANCE,
-    BEFORE_MARCH,
-    BLOCK,
-    COUPLE,
     END,
     FAR,
-    FORCE,
-    FORGET,
     HELD,
-    HOLD,
-    MEASURE,
-    NO_NUMBERS,
     NONE,
-    RELAX,
     START,
     STRENGTH,
     TURNED,
-    UPDATE,
     read_border,
     read_network,
 )
@@ -78,10 +66,27 @@ from hybrid.kernels.junctions.joined_lines import (
 )
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import JOINED, LEAST_SPIN_STIFFNESS
-from hybrid.kernels.march.zone_torque import CORRECT, torsional_stiffness
+from hybrid.kernels.march.zone_torque import torsional_stiffness
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.line_step import CORRECTION, LARGEST_TURN, read, twist_zones
+from hybrid.kernels.step.line_step import (
+    AGAIN,
+    BALANCE,
+    BEFORE_MARCH,
+    BLOCK,
+    CORRECTION,
+    COUPLE,
+    FORCE,
+    FORGET,
+    HOLD,
+    LARGEST_TURN,
+    MEASURE,
+    NO_NUMBERS,
+    RELAX,
+    UPDATE,
+    read,
+    twist_zones,
+)
 
 # Columns of S; its rows are as the first of them.
 TENSION = 0  # of the start
@@ -557,5 +562,5 @@ def twist_lines(table):
         if question == FORGET and known.shape[0] > 0:
             known[0] = -1.0
         elif question == COUPLE:
-            twist_zones(1, job, job.new, CORRECT, network.asked.scheme_cv)
+            twist_zones(1, job, job.new, network.asked.scheme_cv, COUPLE)
     return 1.0

@@ -56,12 +56,8 @@ from hybrid.kernels.contact.self_contact_pairs import (
     first_in_contact,
 )
 from hybrid.kernels.junctions.borders import (
-    COUPLE,
     END,
-    NO_SOLUTION,
     NONE,
-    PREDICT,
-    SAFE_PART,
     answer_right_sides,
     clear_right_side,
     hand_on,
@@ -77,14 +73,16 @@ from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY, SELF_FRICTION_WORK
 from hybrid.kernels.state.state import Blocks, Floats, NumberRows, Rows, blanks
 from hybrid.kernels.step.line_step import (
+    ACCEPT,
     ASKED,
+    COUPLE,
     FIND,
-    FINISH,
-    GAIN,
-    LIMIT,
-    PREPARE,
+    JUDGE,
+    NO_SOLUTION,
+    PREDICT,
     RADIUS,
-    REST,
+    SAFE_PART,
+    STAND,
     ask_contact,
     read,
     touches,
@@ -219,13 +217,13 @@ def work_on(job, one, k):
 @inner
 def spread(job, one, phase):
     """Give the lines what contact has: energy, work, force per length, and what it puts on ends that are held."""
-    row, last, y = 2 if phase == FINISH else 0, 0.0, one.contact.y
+    row, last, y = 2 if phase == ACCEPT else 0, 0.0, one.contact.y
     find_pushes(one, job.pushes[LATEST])
-    job.times[LATEST] = one.clock.try_end if phase == FINISH else one.clock.now
+    job.times[LATEST] = one.clock.try_end if phase == ACCEPT else one.clock.now
     for k in range(job.lines.shape[0]):
         for j in range(SHARES):
             job.shares[LATEST, k, j] = one.contact.shares[k, j]
-    if phase == REST:
+    if phase == STAND:
         keep_latest(job)
     note_meetings(job, one, job.times[LATEST])
     for k in range(job.lines.shape[0]):
@@ -238,7 +236,7 @@ def spread(job, one, phase):
         if books.touch.shape[1] > 0:
             for i in range(n + 1):
                 books.touch[row, i] = one.touch[row, at + i]
-        if phase == FINISH:
+        if phase == ACCEPT:
             report[SELF_FRICTION_WORK] = work_on(job, one, k)
             load_ends(line_job.ends, y, at, n, report)
     return last
@@ -292,13 +290,13 @@ def shared_task(table):
     one, last = read_contact(job.inner), read(job.tables[job.lines[job.lines.shape[0] - 1]])
     phase = one.call[ASKED]
     one.counts.controlled, one.counts.parity = last.books.counts.controlled, 0
-    if phase == GAIN:
+    if phase == JUDGE:
         return 1.0 if puts_energy_in(job, one) else 0.0
-    if phase == PREPARE:
+    if phase == PREDICT:
         share_clock(job, one)
     gather(job, one)
     value = contact_task(job.inner)
-    if phase in (FINISH, REST):
+    if phase in (ACCEPT, STAND):
         return spread(job, one, phase)
     return value
 
@@ -486,7 +484,7 @@ def put_contact(network, job):
     for l in range(network.tables.shape[0]):
         line_job = read(network.tables[l])
         if touches(line_job):
-            ask_contact(line_job, REST if job.rests[0] else FIND)
+            ask_contact(line_job, STAND if job.rests[0] else FIND)
             contact = read_contact(job.contacts[l]).contact
             if contact.counts.overflow:
                 return NO_SOLUTION
@@ -511,7 +509,7 @@ def prepare_contact(network):
             clock = job.books.clock
             clock.now, clock.try_end, clock.step_before, clock.rho = t - task.dt, t, task.before, task.rho
             clock.rho_before = task.rho_before
-            safe = min(safe, ask_contact(job, PREPARE))
+            safe = min(safe, ask_contact(job, PREDICT))
             rho = min(rho, ask_contact(job, RADIUS))
     common = with_radius(task, rho)
     for l in range(network.tables.shape[0]):
@@ -533,7 +531,7 @@ def safe_part(network):
     for l in range(network.tables.shape[0]):
         job = read(network.tables[l])
         if touches(job):
-            part = min(part, ask_contact(job, LIMIT))
+            part = min(part, ask_contact(job, SAFE_PART))
     return part
 
 

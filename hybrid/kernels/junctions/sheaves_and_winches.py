@@ -21,9 +21,6 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE
 from hybrid.kernels.junctions.borders import (
-    AGAIN,
-    COUPLE,
-    UPDATE,
     answer_right_sides,
     clear_right_side,
     eliminate_right_side,
@@ -41,7 +38,7 @@ from hybrid.kernels.reel.reel import MOVES, WAITS
 from hybrid.kernels.reel.reel import read as read_reel
 from hybrid.kernels.state.report import BEARING, FREE, INERTIA, SPIN, TRUE
 from hybrid.kernels.state.state import Blocks, Rows, blanks
-from hybrid.kernels.step.line_step import STEP, read, wind
+from hybrid.kernels.step.line_step import AGAIN, COUPLE, STEP, UPDATE, read, wind
 
 # Columns of an unknown: the sheave, or the line of the winch; g, d, and d + q z.
 OF, LEFT_OVER, STIFF, YIELDING = range(4)
@@ -246,7 +243,7 @@ def give_lengths(network, job):
         line_job = read(network.tables[int(job.unknowns[j, OF])])
         stage = read_reel(line_job.reel_table).reel.stage
         stage.change, stage.lengthens = step_of(network, job, True, j), MOVES
-        wind(line_job)
+        wind(line_job, STEP, UPDATE)
 
 
 @kernel

@@ -39,7 +39,7 @@ from hybrid.kernels.state.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING, S
 from hybrid.kernels.state.state import Floats, Line, Torsion, blank_state, no_ends, no_torsion, no_work, on_line
 
 # Parts of `pass_torque`.
-BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
+TORQUES, CORRECT, REPORT = range(3)
 # Columns of State.turn.
 TURN = 0
 TORQUE = 1
@@ -338,15 +338,15 @@ def correct(line, state, work, cv, joined):
 def pass_torque(line, ends, state, work, part, cv):
     """A part of Newton's iteration for a line whose state has turns; cv: dv'/dr' of the scheme, 1/s.
 
-    BEFORE_MARCH  the torques of the configuration, for the march
-    CORRECT       its solution work.x with the torques that change with it; the march has kept its factors
-    AFTER_STEP    powers of the configuration found, and what it reports: moments of the ends, loss
+    TORQUES  the torques of the configuration, for the march
+    CORRECT  its solution work.x with the torques that change with it; the march has kept its factors
+    REPORT   powers of the configuration found, and what it reports: moments of the ends, loss
 
     A line that is catenary from end to end feels nothing of its torque, unless that lengthens it: it is found after the
     step.
     """
     felt = couples(line) or line.torsion[0, FIRST] > 0.0 or line.torsion[0, LAST] < line.h.shape[0]
-    if part == AFTER_STEP:
+    if part == REPORT:
         if not felt:
             find_torques(line, ends, state, work)
         work.report[STIFFNESS_DAMPING_POWER] += finish(line, ends, state, work.torsion)

@@ -28,11 +28,8 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
 )
 from hybrid.kernels.junctions.borders import (
-    BEFORE_MARCH,
     END,
-    FORCE,
     NONE,
-    PREDICT,
     START,
     ask,
     read_network,
@@ -55,7 +52,6 @@ from hybrid.kernels.state.report import (
     LOCAL_ERROR,
     RESIDUAL,
     SEABED_ENERGY,
-    SELF_CONTACT_ENERGY,
     SLACKEST_CELL,
     TOUCHES,
 )
@@ -74,44 +70,47 @@ from hybrid.kernels.step.accept import (
 )
 from hybrid.kernels.step.line_step import (
     ASSEMBLY,
+    BEFORE_MARCH,
+    CARRY,
+    FORCE,
+    ITERATION,
     OK,
-    REST,
+    PREDICT,
     SINGULAR,
     SLACK,
+    STAND,
+    STEP,
     TURNED_TOO_FAR,
     Task,
-    ask_contact,
+    ask_line,
     begin_line_step,
     call_quantities,
-    call_reel,
-    carry,
     end_line_step,
     judge_line,
     read,
     round_off_tension,
     rubs,
     size_of,
-    touches,
-    wind,
+    states_of,
     with_radius,
 )
-from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, find_rates
-from hybrid.kernels.step.step_control import scheme
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, find_rates
+from hybrid.kernels.step.step_control import Scheme, scheme
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
 call_solver = caller((0, 0, 0.0, 0))
 # Places among the numbers of a job, whose first field is its task.
+TASK_WHAT = Task._fields.index("what")
 TASK_CV = Task._fields.index("cv")
 TASK_CA = Task._fields.index("ca")
 TASK_DT = Task._fields.index("dt")
 
 
 @inner
-def march_lines(network, steps):
+def march_lines(network):
     """March all lines, and find what they and borders do to points and bodies.
 
-    steps: whether this is an iteration of a step, of which lines that are paid out know (kernels.reel.payout.iterate).
     Returns -1 or a line that failed, and its bad node.
     """
     tables, joints = network.tables, network.joints
@@ -119,8 +118,6 @@ def march_lines(network, steps):
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
-        if steps:
-            wind(job)
         outcome, _, _, where = call_solver(network.solver, tables[l])
         # the last block is not solved yet; forces of a line alone are known whatever its equations are
         known = joints[l, END] != NONE and where == n
@@ -128,8 +125,6 @@ def march_lines(network, steps):
             known = job.work.report[RESIDUAL] < math.inf
         if outcome != OK and not (outcome == SINGULAR and known):
             return l, where
-        if steps:
-            wind(job)
     ask(network, FORCE)
     return -1, -1
 
@@ -155,17 +150,11 @@ def size_up(tables, ca):
 
 
 @inner
-def states_of(job):
-    """The states between which a line is solved with others."""
-    return States(job.old, job.new, job.was, job.now)
-
-
-@inner
 def carry_lines(tables, s, what):
     """What all lines remember goes to where the last correction has led."""
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        carry(job, states_of(job), s, what)
+        ask_line(1, job, states_of(job), s, what, CARRY)
 
 
 @inner
@@ -250,6 +239,7 @@ def begin_line(table):
 @inner
 def begin_books(tables, t):
     """Powers of the states as they are, what the seabed stores, and extremes where they are kept; t: s, now."""
+    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for l in range(tables.shape[0]):
         job = read(tables[l])
         line, sea, new, books, report = job.line, job.sea, job.new, job.books, job.work.report
@@ -260,12 +250,9 @@ def begin_books(tables, t):
                 grip_obstacles(line, sea, job.work.u, new, new.grip, new.grip)
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
-        if touches(job):
-            books.clock.now = t
-            report[SELF_CONTACT_ENERGY] = ask_contact(job, REST)
+        books.clock.now = t
         move_joints(job)
-        if job.reel != 0:
-            call_reel(job.reel, job.reel_table)
+        ask_line(1, job, states_of(job), s, ASSEMBLY, STAND)
         begin_books_of(tables[l], job, t)
 
 
@@ -344,6 +331,7 @@ def give_scheme(network, task, s):
     rub, tables, numbers = False, network.tables, network.numbers
     network.asked.scheme_cv, network.asked.scheme_ca = s.cv, s.ca
     for l in range(tables.shape[0]):
+        network.tables[l, TASK_WHAT] = ITERATION if task.what == STEP else ASSEMBLY
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
         rub = rubs(read(tables[l])) or rub
     return rub

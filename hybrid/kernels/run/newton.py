@@ -3,7 +3,7 @@
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
 tensions, frames and rates.  Of joined lines each is marched by the kernel of a line, which is called by its address.
 
-What it works on, and what is beside the band of a line: kernels.step.line_step.  What couples lines is a border, points and
+What it works on: kernels.step.line_step; what is beside the band of a line: kernels.step.line_step.  What couples lines is a border, points and
 bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
 `plane` and `space`: for which kind of line (kernels.march.march); numba drops what stands behind `is not None` of what is
 None, so that neither solution is compiled with the other.
@@ -25,20 +25,9 @@ from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH, sub
 from hybrid.kernels.algebra.plane import WIDE, substitute_planar
 from hybrid.kernels.junctions.bodies import book_bodies, start_here
 from hybrid.kernels.junctions.borders import (
-    BALANCE,
-    BLOCK,
-    CARRY,
-    COUPLE,
     FAR,
-    FORGET,
-    HOLD,
-    MEASURE,
-    NO_NUMBERS,
-    RELAX,
-    SAFE_PART,
     STRENGTH,
     TURNED,
-    UPDATE,
     ask,
     read_network,
     task_of,
@@ -49,7 +38,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly_plane import march_planar
 from hybrid.kernels.march.march import LANES, ROWS, first_bad, march, measure, update
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.march.zone_torque import AFTER_STEP, torsion_of
+from hybrid.kernels.march.zone_torque import torsion_of
 from hybrid.kernels.run.network import (
     JUNCTIONS,
     begin_books,
@@ -75,36 +64,47 @@ from hybrid.kernels.state.state import (
 )
 from hybrid.kernels.step.line_step import (
     ASSEMBLY,
+    BALANCE,
+    BEFORE_MARCH,
+    BLOCK,
+    CARRY,
     CORRECTION,
+    COUPLE,
     CUT_SHORT,
     EQUILIBRIUM,
+    FORCE,
+    FORGET,
+    HOLD,
+    ITERATION,
     LARGEST_TURN,
+    MEASURE,
+    NO_NUMBERS,
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
     OPEN,
+    PREDICT,
+    RADIUS,
+    RELAX,
     RUN,
+    SAFE_PART,
     SINGULAR,
     STEP,
     TURNED_TOO_FAR,
+    UPDATE,
     WHOLE,
     Limits,
     Task,
-    after_march,
-    before_march,
+    ask_line,
     begin_line_step,
     blank_job,
-    carry,
-    couple,
     end_line_step,
     has_converged,
-    prepare,
+    is_march,
     read,
     round_off_tension,
     rubs,
-    safe_part,
     size_of,
-    twist_zones,
     with_radius,
 )
 from hybrid.kernels.step.step import States, find_rates
@@ -139,7 +139,7 @@ def iterate(plane, space, line, lines, task, s):
             outcome, before = found, math.inf
             break
         if line is not None:
-            part, size, worst, where = part_of_line(line, task, s, it)
+            part, size, worst, where = part_of_line(space, line, task, s, it)
             move_line(plane, space, line, task, s, part)
         if lines is not None:
             part, size, worst, where = part_of_lines(lines, task, s, it)
@@ -168,32 +168,34 @@ def correct_line(plane, space, of, task, s, where):
     """
     job, states, _ = of
     line, work, new, bad, good = job.line, job.work, states.new, -1, True
-    before_march(space, job, states, s, task.what)
+    what = task.what
+    ask_line(space, job, states, s, what, BEFORE_MARCH)
     if space is not None:
         bad = march(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
     if plane is not None:
         bad = march_planar(line, job.sea, job.ends, states.old.r, new, s.cv, s.ca, work)
+    if bad < 0 or (what == ITERATION and bad == line.h.shape[0]):  # whose last block is solved with other lines
+        ask_line(space, job, states, s, what, BALANCE)
     if bad >= 0:
         if not work.report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
             return NOT_FINITE, 0, int(work.report[RESIDUAL_NODE])
         return SINGULAR, 0, bad
-    if task.what == ASSEMBLY:
+    if is_march(what):
         return OK, 0, where
-    after_march(job, task.what)
     if space is not None:
         good = substitute(work.X, work.x, False, None)
     if plane is not None:
         good = substitute_planar(plane, work.X, work.x)
-    coupled = couple(space, job, states, s, task.what, good)
     if not good:
         return NOT_FINITE, 0, first_bad(work.x, new.e)
-    if task.what == CORRECTION:
+    coupled = ask_line(space, job, states, s, what, COUPLE)
+    if what == CORRECTION:
         return OK, 0, where
-    return (OPEN if coupled else NOT_CONVERGED), 0, where
+    return (OPEN if coupled > 0.0 else NOT_CONVERGED), 0, where
 
 
 @inner
-def part_of_line(of, task, s, it):
+def part_of_line(space, of, task, s, it):
     """The part of the correction that is made, its size, and its cell."""
     job, states, noise = of
     limits = task.limits
@@ -201,7 +203,8 @@ def part_of_line(of, task, s, it):
     part = 1.0
     if shift > limits.reach and not task.turning:
         part = limits.reach / shift
-    part = min(damped_part(part, turn, rubs(job), s, it), safe_part(job))
+    safe = ask_line(space, job, states, s, task.what, SAFE_PART)
+    part = min(damped_part(part, turn, rubs(job), s, it), safe)
     return part, size_of(turn, shift, pull, big, limits, noise), 0, where
 
 
@@ -218,7 +221,7 @@ def solve(plane, space, task, job, states):
 
     STEP            predict `new` from `old`, solve, find the rates; books.strains: of elements, empty: not wanted
     EQUILIBRIUM     solve from the prediction in work.u and `new`
-    ASSEMBLY        one march, for its report and its block rows
+    ASSEMBLY        one march, for its report and its block rows; likewise ITERATION
     CORRECTION      one march and the solution of its equations, into work.x
 
     Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
@@ -228,8 +231,8 @@ def solve(plane, space, task, job, states):
     """
     line, work, new, s = job.line, job.work, states.new, Scheme(task.dt, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
-        safe, rho = prepare(job, task.rho)
-        task = with_radius(task, rho)
+        safe = ask_line(space, job, states, s, STEP, PREDICT)
+        task = with_radius(task, min(task.rho, ask_line(space, job, states, s, STEP, RADIUS)))
         s = scheme(task.rho, task.before, task.rho_before, task.dt)
         far, turn, where = begin_line_step(plane, space, job, states, s, safe)
         if far:
@@ -238,9 +241,9 @@ def solve(plane, space, task, job, states):
     outcome, it, left, _, where, cut_short = iterate(plane, space, of, None, task, s)
     if task.what == STEP:
         find_rates(space, line, job.sea, states.old, new, work.u, s)
-    if task.what != ASSEMBLY or work.couple.shape[0] > 0:  # rates of twist are known now
-        carry(job, states, s, task.what)
-    twist_zones(space, job, new, AFTER_STEP, s.cv)
+    if not is_march(task.what) or work.couple.shape[0] > 0:  # rates of twist are known now
+        ask_line(space, job, states, s, task.what, CARRY)
+    ask_line(space, job, states, s, task.what, FORCE)
     if task.what == STEP and outcome == OK:
         far, turn, cell = end_line_step(plane, space, task, job, states, s)
         if far:
@@ -258,7 +261,7 @@ def correct_lines(of, task, s, it):
     """Corrections of iteration `it` of all lines and borders, in space; as of `correct_line`."""
     network, _ = of
     tables = network.tables
-    line, where = march_lines(network, task.what == STEP)
+    line, where = march_lines(network)
     if line >= 0:
         report = read(tables[line]).work.report
         if not report[RESIDUAL] < math.inf:

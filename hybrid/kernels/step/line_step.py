@@ -4,20 +4,19 @@
 
 `Job` has all that steps of a line need, by reference: it is the table of an entry of kernels.run.newton.
 
-What is beside the band of the line is a border.  Newton asks all of them a question in one place, by the function that is
-named here, and in this order; of a line that does not have it each costs a comparison.  Of joined lines it asks the same
-functions of each line where no border of joined lines takes their place.
+What couples beside the band of a line is a border.  A line and joined lines (kernels.junctions.borders) ask borders the
+same questions, in the order in which they stand below.  The borders of a line are one list, `ask_line`, which is all that
+Newton's method knows of them.  A border that the line does not have costs a comparison.
 
-    border                     prepare       before_march     after_march  couple      safe_part  carry
-    torque through catenaries                torques                       correction             powers
-    law of length                            linearised                                           means
-    layers that slip                         what they bear                                       slip
-    winch                                    nodes that ride  length
-    contact with itself        part, radius                                forces      part       energy
+    border of a line                  is asked
+    torque through catenary zones     BEFORE_MARCH, COUPLE, FORCE           kernels.march.zone_torque
+    law of length                     BEFORE_MARCH, CARRY                   kernels.laws.axial_law
+    layers that slip                  BEFORE_MARCH, CARRY                   kernels.laws.bending_law
+    winch                             BEFORE_MARCH, BALANCE, UPDATE, STAND  kernels.reel.payout
+    contact with itself               PREDICT, RADIUS, COUPLE, SAFE_PART,   kernels.contact.self_contact
+                                      ACCEPT, JUDGE, STAND
 
-Sheaves that turn freely are borders of all lines (kernels.junctions.sheaves_and_winches): a line by itself has none.
-
-The powers of torques and the energy of contact are of a step that is found alone (`end_line_step`).
+Of joined lines the network asks its own borders to COUPLE, BALANCE and UPDATE: these ask those of its lines.
 """
 
 from __future__ import annotations
@@ -30,10 +29,10 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_law import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST, update_slip
 from hybrid.kernels.laws.tension_torque import linearise_stretch
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.march import AT_REST
-from hybrid.kernels.march.zone_torque import BEFORE_MARCH, CORRECT, pass_torque
+from hybrid.kernels.march.zone_torque import CORRECT, REPORT, TORQUES, pass_torque
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import AXIAL_LAW, BENDING_SLIP, FRICTION, HELD_SLIP, SELF_CONTACT_ENERGY, SLACKEST
 from hybrid.kernels.state.state import (
@@ -51,23 +50,13 @@ from hybrid.kernels.state.state import (
     no_sea,
     no_work,
 )
-from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step
-from hybrid.kernels.step.step_control import before_fixed, radius_of_step
-
-# The same of a step of a line that may touch itself: longer ones feed the vibrations that contact leaves.
-LARGEST_CONTACT_TURN = 0.3
-
-# Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
-# (kernels.contact.self_contact).
-ADDRESS, ASKED, NEAR = range(3)
-SHARED = -1  # in place of an address: contact of the line is computed with that of another line
-PREPARE, LIMIT, TOUCH, FINISH, REST, RADIUS, GAIN, FIND = range(8)
-call_contact = caller(0.0)
-call_reel = caller(0)
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, States, begin_step, end_step
+from hybrid.kernels.step.step_control import Scheme, before_fixed, radius_of_step
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = range(6)  # errors.Outcome, as kernels see it
 CUT_SHORT = -1  # a step that is taken though Newton has not converged in the iterations it may take (Task.cut)
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = range(5)
+ITERATION = 6  # as ASSEMBLY, of an iteration of a step that is solved with others
 OPEN = -2  # of an iteration: its corrections are found, and are to be made
 
 
@@ -116,6 +105,12 @@ LOW_TENSION = 1e-3
 # A chord that would turn by more than this in one iteration shortens the whole correction
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
 LARGEST_TURN = 0.7
+
+
+@inner
+def is_march(what):
+    """Whether a task is one march of a line, and solves nothing."""
+    return what in (ASSEMBLY, ITERATION)
 
 
 @inner
@@ -212,21 +207,70 @@ def size_of(turn, shift, pull, big, limits, noise):
     return size if pull < noise else max(size, pull / max(big, LOW_TENSION * limits.scale))
 
 
-# --- borders of a line: one of them at a time ---------------------------------------------------------------
+# --- questions ------------------------------------------------------------------------------------------------
+# Answered by 1 where nothing else is said; of several borders the least answer counts.
+
+# A step begins; answered by the part of its prediction that is safe.  Of a network `asked.rho_of_step` falls to the
+# spectral radius that the step may have.
+PREDICT = 0
+FORGET = 1  # a solution begins: what was known of another one is found anew
+BEFORE_MARCH = 2  # what it carries goes to where its unknowns are
+FORCE = 3  # after the march: what lines and it do to points and bodies, or bear, in this state
+BALANCE = 4  # what its own equations leave over, when all of that is known
+BLOCK = 5  # columns, functional and block that fall on points and bodies, into A
+HOLD = 6  # springs against what nothing else holds, in the first iteration of an equilibrium
+COUPLE = 7  # its part of the corrections of the iteration; 0: singular, or as below
+AGAIN = 8  # its part of other corrections of the iteration, which have no residual; 0: not finite
+MEASURE = 9  # the largest shift and turn of its unknowns, into `moves`
+SAFE_PART = 10  # answered by the part of the corrections that is safe
+UPDATE = 11  # its unknowns move by the part of the corrections that is made
+RELAX = 12  # springs of HOLD follow the turns
+CARRY = 13  # a solution has ended: what it carries goes to where that has led
+# Of a line alone, or of each line.
+RADIUS = 14  # answered by the spectral radius that the step may have, where equal steps have the largest one
+ACCEPT = 15  # a step is solved: what it reports of it
+JUDGE = 16  # 0: the step is to be made in halves, as the border has put energy in
+STAND = 17  # what it reports of a state that no step has led to
+FIND = 18  # of contact: its points alone, which kernels.junctions.lines_contact solves for
+# Answers to COUPLE.
+NO_NUMBERS = -1.0  # corrections are not finite
+NO_SOLUTION = -2.0  # none were found in the iterations that there are
+
+# Contact of the line with itself: places of `Job.contact` (address, what is asked, whether it is near).
+ADDRESS, ASKED, NEAR = range(3)
+SHARED = -1  # in place of an address: contact of the line is computed with that of another line
+
+# The largest turn, rad, of a chord in a step of a line that may touch itself: longer ones feed the vibrations that
+# contact leaves.
+LARGEST_CONTACT_TURN = 0.3
+
+call_contact = caller(0.0)
+call_reel = caller(0)
+
+
+# --- the borders ----------------------------------------------------------------------------------------------
 
 
 @inner
-def twist_zones(space, job, state, part, cv):
-    """A part of what a torque through catenary zones takes (kernels.march.zone_torque), where there is one."""
+def twist_zones(space, job, state, cv, question):
+    """Answer for a torque through catenary zones; cv: dv'/dr' of the scheme, 1/s."""
     if space is not None:
         if job.work.torsion.known.shape[0] != 0:
-            pass_torque(job.line, job.ends, state, job.work, part, cv)
+            part = -1
+            if question == BEFORE_MARCH:
+                part = TORQUES
+            elif question == COUPLE:
+                part = CORRECT
+            elif question == FORCE:
+                part = REPORT
+            if part >= 0:
+                pass_torque(job.line, job.ends, state, job.work, part, cv)
 
 
 @inner
-def stretch_by_law(job, states, s):
-    """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law)."""
-    if job.line.bits & AXIAL_LAW:
+def stretch_by_law(job, states, s, question):
+    """Answer for a law of length: it is linearised where the line is."""
+    if question in (BEFORE_MARCH, CARRY) and job.line.bits & AXIAL_LAW:
         dt = s.dt
         if not dt > 0.0 and not (s.cv == 0.0 and s.ca < AT_REST):
             dt = -1.0
@@ -234,17 +278,29 @@ def stretch_by_law(job, states, s):
 
 
 @inner
-def pass_slip(job, states, part):
-    """A part of what layers that slip on each other take (kernels.laws.bending_law), if there are any."""
-    if job.line.bits & (BENDING_SLIP | HELD_SLIP) == BENDING_SLIP:
+def slip_layers(job, states, s, what, question):
+    """Answer for layers that slip on each other: what they bear, and how far they have slipped."""
+    if job.line.bits & (BENDING_SLIP | HELD_SLIP) != BENDING_SLIP:
+        return
+    part = -1
+    if question == BEFORE_MARCH:
+        part = IN_MOTION if s.dt > 0.0 or s.cv != 0.0 or s.ca >= AT_REST else LOADED_FIRST
+    elif question == CARRY and what in (STEP, EQUILIBRIUM):
+        part = BEHIND_STEP if what == STEP else BEHIND_REST
+    if part >= 0:
         update_slip(job.line, job.ends, states.old, states.new, job.work, part)
 
 
 @inner
-def wind(job):
-    """What a line that is paid out does in an iteration of a step (kernels.reel.payout.iterate)."""
-    if job.iterated != 0:
-        call_reel(job.iterated, job.reel_table)
+def wind(job, what, question):
+    """Answer for a winch: nodes that ride, the length, and the force of its fairlead."""
+    if question == STAND:
+        if job.reel != 0:
+            call_reel(job.reel, job.reel_table)
+    elif job.iterated != 0:
+        steps = what in (STEP, ITERATION) and question in (BEFORE_MARCH, BALANCE)
+        if steps or question == UPDATE:
+            call_reel(job.iterated, job.reel_table)
 
 
 @inner
@@ -254,10 +310,46 @@ def touches(job):
 
 
 @inner
-def ask_contact(job, what):
+def ask_contact(job, question):
     """What kernels.contact.self_contact answers."""
-    job.contact[ASKED] = what
+    job.contact[ASKED] = question
     return call_contact(job.contact[ADDRESS], job.contact_table)
+
+
+@inner
+def touch_itself(job, s, what, question):
+    """Answer for contact of the line with itself."""
+    if not touches(job):
+        return 1.0
+    if question == COUPLE:
+        return 1.0 if what == CORRECTION else ask_contact(job, question)
+    if question == JUDGE:
+        may_gain = job.reel == 0 and 0.5 * s.dt >= job.books.clock.shortest
+        return 1.0 - ask_contact(job, question) if may_gain else 1.0
+    if question in (ACCEPT, STAND):
+        job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job, question)
+    elif question in (PREDICT, RADIUS, SAFE_PART):
+        return ask_contact(job, question)
+    return 1.0
+
+
+@called
+def ask_line(space, job, states, s, what, question):
+    """Ask all borders of a line a question; the least of their answers.
+
+    states: between which the line is solved; s: the scheme, and `what` the task.
+    """
+    twist_zones(space, job, states.new, s.cv, question)
+    stretch_by_law(job, states, s, question)
+    slip_layers(job, states, s, what, question)
+    wind(job, what, question)
+    return touch_itself(job, s, what, question)
+
+
+@inner
+def states_of(job):
+    """The states between which a line is solved with others."""
+    return States(job.old, job.new, job.was, job.now)
 
 
 @inner
@@ -266,72 +358,7 @@ def rubs(job):
     return (job.line.bits & FRICTION) != 0 or (touches(job) and job.contact[NEAR] != 0)
 
 
-@inner
-def judge_line(job, dt, floor):
-    """Outcome of a step of dt (s) that is solved: in halves where contact has put energy in; slack below floor (N)."""
-    may_gain = touches(job) and job.reel == 0 and 0.5 * dt >= job.books.clock.shortest
-    if may_gain and ask_contact(job, GAIN) > 0.0:
-        return TURNED_TOO_FAR
-    return OK if job.work.report[SLACKEST] > floor else SLACK
-
-
-# --- borders of a line: one question of all of them ----------------------------------------------------------
-
-
-@inner
-def prepare(job, rho):
-    """Before a step is tried: the part of its prediction that is safe, and its spectral radius, where equal steps have rho.
-
-    Where the line touches itself the radius is 0: what contact excites within a step must not stay.
-    """
-    safe = 1.0
-    if touches(job):
-        safe = ask_contact(job, PREPARE)
-        rho = ask_contact(job, RADIUS)
-    return safe, rho
-
-
-@inner
-def before_march(space, job, states, s, what):
-    """What borders do to the equations of the configuration, before they are assembled."""
-    twist_zones(space, job, states.new, BEFORE_MARCH, s.cv)
-    stretch_by_law(job, states, s)
-    pass_slip(job, states, IN_MOTION if s.dt > 0.0 or s.cv != 0.0 or s.ca >= AT_REST else LOADED_FIRST)
-    if what == STEP:
-        wind(job)
-
-
-@inner
-def after_march(job, what):
-    """What they do to equations that are eliminated, before these are solved."""
-    if what == STEP:
-        wind(job)
-
-
-@inner
-def couple(space, job, states, s, what, good):
-    """Put borders into a correction that was found without them, and is `good` if it is finite; False: that fails."""
-    twist_zones(space, job, states.new, CORRECT, s.cv)
-    if good and what != CORRECTION and touches(job):
-        return ask_contact(job, TOUCH) > 0.0
-    return True
-
-
-@inner
-def safe_part(job):
-    """The part of a correction that is safe."""
-    return ask_contact(job, LIMIT) if touches(job) else 1.0
-
-
-@inner
-def carry(job, states, s, what):
-    """What they remember goes to where a solution has led."""
-    stretch_by_law(job, states, s)
-    if what in (STEP, EQUILIBRIUM):
-        pass_slip(job, states, BEHIND_STEP if what == STEP else BEHIND_REST)
-
-
-# --- a step of a line, whichever Newton solves it ------------------------------------------------------------
+# --- a step of a line, whichever Newton solves it -------------------------------------------------------------
 
 
 @inner
@@ -350,7 +377,15 @@ def begin_line_step(plane, space, job, states, s, safe):
 @inner
 def end_line_step(plane, space, task, job, states, s):
     """The report of a step that is solved; whether it turns a chord too far, by how much (rad), and its cell."""
-    if touches(job):
-        job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job, FINISH)
+    ask_line(space, job, states, s, STEP, ACCEPT)
     turn, cell = end_step(plane, space, job.line, job.sea, job.ends, states, s, task, job.work, job.books.strains)
     return not turn < most_turn(job), turn, cell
+
+
+@inner
+def judge_line(job, dt, floor):
+    """Outcome of a step of dt (s) that is solved: in halves where a border asks for it; slack below floor (N)."""
+    s = Scheme(dt, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if not ask_line(1, job, states_of(job), s, STEP, JUDGE) > 0.0:
+        return TURNED_TOO_FAR
+    return OK if job.work.report[SLACKEST] > floor else SLACK
