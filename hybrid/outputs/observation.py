@@ -37,7 +37,6 @@ from hybrid.kernels.state.report import (
     CONTACT_FORCE,
     DAMPING,
     FIXED,
-    FORCE_A,
     LENGTH_OUT,
     PAYOUT_POWER,
     SEABED_ENERGY,
@@ -143,12 +142,17 @@ class Observation(ObservedStates):
         """(ns, nb) N m."""
         return size(self.grid.sides @ self.sides[:, ACROSS:])
 
+    @cached_property
+    def shear_of_cells(self) -> Floats:
+        """(N, 3, nb) N, across the cells; of catenaries zero."""
+        V = cross(self.d, np.diff(self.node_moment, axis=0)) / self.length[:, None]
+        V[self.line.spin == 0] = 0.0
+        return V
+
     @property
     def shear(self) -> Floats:
         """(ns, nb) N."""
-        V = cross(self.d, np.diff(self.node_moment, axis=0)) / self.length[:, None]
-        V[self.line.spin == 0] = 0.0
-        return size(self.grid.cells @ V)
+        return size(self.grid.cells @ self.shear_of_cells)
 
     # ---- curvature and twist ------------------------------------------------------------------
 
@@ -175,10 +179,9 @@ class Observation(ObservedStates):
         return size(self.sides[:, :TWIST])
 
     @property
-    def bends_without_natural(self) -> tuple[Floats, NDArray[np.bool_]]:
-        """Curvature (ns, nb) 1/m less the natural one, and where it is unknown."""
-        a, b, unknown = np.moveaxis(self.grid.sides @ self.sides[:, NATURAL : UNKNOWN + 1], 1, 0)
-        return np.hypot(a, b), unknown > 0.0
+    def bends_without_natural(self) -> Floats:
+        """(3, ns, nb): two bends, 1/m, from the natural ones, and above 0 where they are unknown."""
+        return np.moveaxis(self.grid.sides @ self.sides[:, NATURAL : UNKNOWN + 1], 1, 0)
 
     @cached_property
     def link(self) -> Floats:
@@ -197,12 +200,7 @@ class Observation(ObservedStates):
 
     def reaction(self, k: int) -> Floats:
         """(3, nb) N: force of the support, or of an end body, on the cable at end k; else the force applied there."""
-        b = self.batch
-        held = b.held[:, k] != 0
-        force = -b.report[:, FORCE_A + 3 * k : FORCE_A + 3 * k + 3].T
-        if held.all() or self.loaded(k):
-            return np.asarray(force)
-        return np.where(held, force, b.force[:, k].T)
+        return self._observed.reaction[:, k].T
 
     # ---- seabed and energies, of what was computed --------------------------------------------
 

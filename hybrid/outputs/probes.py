@@ -255,7 +255,7 @@ def layer_errors(view: Observation, loads: Iterable[int]) -> dict[str, Floats]:
     if not view.node_moment.size:
         return out
     points, bends = view.grid.points[:, 0], line.element != 0
-    moment, T, d = view.node_moment[..., 0], view.T[:, 0], view.d[..., 0]
+    moment, T = view.node_moment[..., 0], view.T[:, 0]
     for zone, (first, last, _) in zip(view.grid.parts, view.grid.spans, strict=True):
         if zone.kind != "rod":
             continue
@@ -266,8 +266,7 @@ def layer_errors(view: Observation, loads: Iterable[int]) -> dict[str, Floats]:
             for node, step in ((a, 1), (b, -1)):
                 nodes = node + step * np.arange(3)
                 cell, EI = min(node, nodes[1]), line.kb[nodes[1], :2].max() * line.hn[nodes[1]]
-                shear = np.cross(d[cell], moment[cell + 1] - moment[cell]) / view.length[cell, 0]
-                F = float(np.hypot(T[cell], np.linalg.norm(shear)))
+                F = float(np.hypot(T[cell], np.linalg.norm(view.shear_of_cells[cell, :, 0])))
                 if EI <= 0.0:
                     continue
                 s = abs(line.s[nodes] - line.s[node])

@@ -97,7 +97,7 @@ class Pipes(OfSections):
         return np.asarray(self.rows[self.numbers(s, True), k.MODULUS] > 0.0)
 
     def _observed(self, v: Observation, bend: Floats) -> tuple[Floats, Floats]:
-        """Wall tension (ns, nb) N and stress (ns, nb) Pa; bend: (2, ns, nb) curvature 1/m and torque N m."""
+        """Wall tension (ns, nb) N and stress (ns, nb) Pa; bend: (5, ns, nb) as of `observe_pipes`."""
         shape = v.tension.shape
         sections = np.broadcast_to(self.numbers(v.grid.points, v.grid.after), shape)
         force, stress = np.empty(shape), np.empty(shape)
@@ -107,17 +107,15 @@ class Pipes(OfSections):
 
     def wall_tension(self, v: Observation) -> Floats:
         """(ns, nb) N."""
-        return self._observed(v, np.zeros((2, *v.tension.shape)))[0]
+        return self._observed(v, np.zeros((5, *v.tension.shape)))[0]
 
     def von_mises(self, v: Observation) -> Floats:
         """(ns, nb) Pa: the largest of the four points where stress is largest, by Lame, bending and torsion."""
-        curvature = v.curvature_twist[:, 0]
-        natural = self.rows[self.numbers(v.grid.points, v.grid.after), k.NATURAL]
-        if np.any(natural > 0.0):
-            bent, unknown = v.bends_without_natural
-            bent = np.where(unknown, curvature + natural, bent)
-            curvature = np.where(natural > 0.0, bent, curvature)
-        return self._observed(v, np.stack([curvature, v.torque]))[1]
+        bend = np.zeros((5, *v.tension.shape))
+        bend[0], bend[1] = v.curvature_twist[:, 0], v.torque
+        if np.any(self.rows[:, k.NATURAL] > 0.0):
+            bend[2:] = v.bends_without_natural
+        return self._observed(v, bend)[1]
 
 
 class Capacities(OfSections):

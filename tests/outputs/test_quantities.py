@@ -192,7 +192,7 @@ def stress(**given: float) -> float:
     wall[0, [k.OUTER, k.INNER, k.MODULUS, k.INSIDE]] = OUTER, INNER, 2e11, values["inside"]
     wall[0, [k.WATER, k.SURFACE]] = values["outside"], 1.0
     T = values["force"] - values["inside"] * BORE + values["outside"] * (BORE + STEEL_AREA)
-    bend = np.array([values["curvature"], values["torque"]]).reshape(2, 1, 1)
+    bend = np.array([values["curvature"], values["torque"], 0.0, 0.0, 0.0]).reshape(5, 1, 1)
     k.observe_pipes(wall, np.zeros((1, 1), np.int64), 0.0 * one, T * one, bend, *found)
     assert found[0, 0, 0] == pytest.approx(values["force"], abs=1e-8)
     return float(found[1, 0, 0])

@@ -64,17 +64,26 @@ WALL = 10
 
 
 @inner
-def bend_and_torque(line, ends, state, books, i, side, passed, natural):
-    """Curvature, 1/m, from what has no stress, and torque, N m, on a side of node i; natural: 1/m, without load.
+def bend_from_natural(curvature, natural, a, b, unknown):
+    """Curvature, 1/m, from what has no stress.
 
-    Where the way that sections are curved is not known, it is the most that both curvatures can make.
+    a, b: 1/m, bends from it; natural: 1/m, without load.  Where the way that sections are curved is unknown, it is the most
+    that both curvatures can make.
     """
+    if not natural > 0.0:
+        return curvature
+    return curvature + natural if unknown else math.sqrt(a * a + b * b)
+
+
+@inner
+def bend_and_torque(line, ends, state, books, i, side, passed, natural):
+    """Curvature, 1/m, as of `bend_from_natural`, and torque, N m, on a side of node i."""
     torque = load_on_side(line, ends, state, books, i, side, passed)[1]
     if not natural > 0.0:
         return curvature_at(line, ends, state, books, i, side), torque
     k = element_strain(line, ends, state, i)
     x, _, a, b, unknown = strain_on_side(line, ends, state, books, i, side, k, passed)
-    return abs(x) + natural if unknown else math.sqrt(a * a + b * b), torque
+    return bend_from_natural(abs(x), natural, a, b, unknown), torque
 
 
 @inner
@@ -143,7 +152,8 @@ def note_pipes(line, ends, state, books, t):
 def observe_pipes(walls, sections, z, T, bend, force, stress):
     """Wall tension and stress (ns, nb) of outputs, at heights z under tensions T; stress is NaN where there is no pipe.
 
-    sections: (ns, nb) rows of `walls`; bend: (2, ns, nb) curvature and torque.
+    sections: (ns, nb) rows of `walls`; bend: (5, ns, nb) curvature, torque, and of `bend_from_natural` a, b and whether
+    they are unknown.
     """
     for i in range(T.shape[0]):
         for j in range(T.shape[1]):
@@ -152,7 +162,9 @@ def observe_pipes(walls, sections, z, T, bend, force, stress):
             force[i, j] = tension_of_wall(wall, outside, inside, T[i, j])
             stress[i, j] = math.nan
             if wall[MODULUS] > 0.0:
-                stress[i, j] = largest_stress(wall, outside, inside, force[i, j], bend[0, i, j], bend[1, i, j])
+                a, b, unknown = bend[2, i, j], bend[3, i, j], bend[4, i, j] > 0.0
+                curvature = bend_from_natural(bend[0, i, j], wall[NATURAL], a, b, unknown)
+                stress[i, j] = largest_stress(wall, outside, inside, force[i, j], curvature, bend[1, i, j])
 
 
 # Kinds, by their names in a scene (scene.quantities.KINDS).
@@ -194,11 +206,11 @@ PATH_ROW = 10
 
 
 @inner
-def pull_at(seen, k):
+def pull_at(held, loaded, report, k):
     """f at end k, and whether anything takes it."""
-    if not (seen.held[k] or seen.loaded[k]):
+    if not (held[k] or loaded[k]):
         return (0.0, 0.0, 0.0), False
-    return vector(seen.report, FORCE_A + 3 * k), True
+    return vector(report, FORCE_A + 3 * k), True
 
 
 @inner
@@ -395,7 +407,7 @@ def of_pull(seen, asked, reached, k):
     kind = asked[KIND]
     f, taken = (0.0, 0.0, 0.0), False
     if asked[IDLE] == 0.0:
-        f, taken = pull_at(seen, k)
+        f, taken = pull_at(seen.held, seen.loaded, seen.report, k)
     if kind == HORIZONTAL_FORCE:
         return math.hypot(f[0], f[1])
     if kind == VERTICAL_FORCE:

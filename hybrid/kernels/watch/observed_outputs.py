@@ -61,7 +61,7 @@ from hybrid.kernels.state.state import (
     blanks,
 )
 from hybrid.kernels.watch.extremes import borne, node_pressure
-from hybrid.kernels.watch.named_quantities import touch_at
+from hybrid.kernels.watch.named_quantities import pull_at, touch_at
 from hybrid.kernels.watch.sides import (
     LAYER,
     Rods,
@@ -386,6 +386,7 @@ class Output(NamedTuple):
     energy: Floats  # (5,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy)
     bend: Floats  # (N+1,) 1/m, from cell to cell, inside the line; empty: not asked for
     held: Floats  # (N+2,) N, tension at the start, of the cells, at the end
+    reaction: Rows  # (2, 3) N, force on the line at its ends: of what takes its pull, else that which is applied
     sides: Rows  # (n sides, SIDE)
     bed: Rows  # (N+1, ON_BED)
     touch: Floats  # (TOUCH,)
@@ -397,7 +398,7 @@ _read, _series = reader(_blank()), Series(_blank())
 
 @kernel(inlined=False)
 def observe_outputs(tables):
-    """Find moment, strain, energy, bend, held and sides of all outputs, (nb, size) tables of `Output`."""
+    """Find moment, strain, energy, bend, held, reaction and sides of all outputs, (nb, size) tables of `Output`."""
     for k in range(tables.shape[0]):
         x = _read(tables[k])
         observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.T, x.turn, Observed(x.moment, x.strain, x.energy))
@@ -415,6 +416,9 @@ def observe_outputs(tables):
         for end in range(2):
             at = end * (x.T.shape[0] + 1)
             x.held[at] = end_tension(x.line, x.ends, x, x.report, x.loaded, x.marks, end)
+            pull, taken = pull_at(x.ends.held, x.loaded, x.report, end)
+            for j in range(3):
+                x.reaction[end, j] = -pull[j] if taken else x.ends.force[end, j]
         put_layers(x.line, x.ends, x, x)
         restore_stiffness(x.line, x.ends, Rods(x.e, x.T, x.strains, x.hinges, x.marks))
         put_sides(x)
@@ -580,6 +584,7 @@ class Found(NamedTuple):
     energy: Floats  # (nb, 5) J
     bend: Floats  # (nb, N+1) 1/m; of rod alone (nb, 0)
     held: Floats  # (nb, N+2) N
+    reaction: Floats  # (nb, 2, 3) N
     sides: Floats  # (nb, n sides, SIDE)
     bed: Floats  # (nb, N+1, ON_BED); without a bed (nb, 0, ON_BED)
     touch: Floats  # (nb, TOUCH)
@@ -613,7 +618,7 @@ def observed(
     z = np.zeros
     out = {"energy": z((nb, 5)), "bend": z((nb, n + 1 if catenary else 0)), "held": z((nb, n + 2))}
     out |= {"bed": z((nb, n + 1 if touches else 0, ON_BED)), "touch": z((nb, TOUCH))}
-    out |= {"sides": z((nb, what.sides, SIDE)), "strains": z((nb, n + 1, STRAINS))}
+    out |= {"reaction": z((nb, 2, 3)), "sides": z((nb, what.sides, SIDE)), "strains": z((nb, n + 1, STRAINS))}
     own = out | ({"moment": moment, "strain": strain} if rods else {})
     state = {name: getattr(batch, name) for name in ("r", "e", "v", "a1", "w", "T", "report")}
     if batch.turn.size:
@@ -645,7 +650,7 @@ def observed_joined(
     """
     nodes, M, catenary, touches = int(begin[1]), begin[-1], not line.spin.all(), line.bits & SEABED
     z, nb = np.zeros, begin.size - 1
-    each = {"energy": z((nb, 5)), "touch": z((nb, TOUCH))}
+    each = {"energy": z((nb, 5)), "touch": z((nb, TOUCH)), "reaction": z((nb, 2, 3))}
     found = {"moment": z((M, 3)), "strain": z((M, 3)), "bend": z(M if catenary else 0)}
     found |= {"bed": z((M if touches else 0, ON_BED)), "held": z(M + nb), "sides": z((rows[-1], SIDE))}
     on_nodes = {"r": batch.r[0], "v": batch.v[0], "marks": what.marks, "strains": np.zeros((M, STRAINS))}
