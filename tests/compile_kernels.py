@@ -46,8 +46,8 @@ BY_TABLE = {
         mesh.cell_changes.clear_state mesh.cell_changes.renew mesh.remesh.put_cells mesh.remesh.begin_cells
         mesh.remesh.end_cells contact.self_contact.contact_task contact.self_distance.watch_itself
         junctions.lines_contact.touch_network junctions.lines_contact.shared_task
-        junctions.sheaves_and_winches.wind_lines junctions.sheaves_and_winches.spin_sheaves junctions.junctions.twist_lines
-        junctions.junctions.join_lines junctions.body_contact.meet_bodies
+        contact.self_contact_pairs.observe_points junctions.sheaves_and_winches.wind_lines junctions.sheaves_and_winches.spin_sheaves
+        junctions.junctions.twist_lines junctions.junctions.join_lines junctions.body_contact.meet_bodies
         watch.named_quantities.note_quantities run.network_run.run_network""",
 }
 

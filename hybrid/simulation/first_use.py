@@ -39,6 +39,7 @@ BOOKS_OF_LINES, START_OF_LINES = "run.network.book_network_step", "run.network.b
 EXTREMES, WEIGHED = "watch.extremes.note_extremes", "mesh.zone_step.evaluate"
 ENERGIES = "march.energies.observe"
 TOUCHING_LINES = "junctions.lines_contact.touch_network", "junctions.lines_contact.shared_task"
+PAIRS = "contact.self_contact_pairs.observe_points"  # what pairs of them press on each other with
 PAYOUT_OF_LINES = "reel.payout.pay_out", "reel.payout.stand_among", "mesh.remesh.change_cells"  # this one: the rest
 
 PAID_ZONES = "reel.payout_nodes.carry_zones"  # of lines whose zones move
@@ -83,6 +84,8 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
         found += [*PAYOUT_OF_LINES, *([PAID_ZONES] if scene.adaptive else [])]
     if pairs or touch_themselves:
         found += TOUCHING_LINES
+    if pairs:
+        found.append(PAIRS)
     if touch_themselves:
         found.append(TOUCHING)
     return found
@@ -155,7 +158,7 @@ def compile_all(names: Sequence[str]) -> None:
     if PAYOUT_OF_LINES[2] in names:
         for kernel in payout_kernels():
             kernel.compile_unless_busy(NO_TABLE)
-    _compile_by_table(names, TOUCHING, *TOUCHING_LINES, *PAYOUT_OF_LINES[:2], PAID_ZONES)
+    _compile_by_table(names, TOUCHING, *TOUCHING_LINES, PAIRS, *PAYOUT_OF_LINES[:2], PAID_ZONES)
     _compile_by_table(names, STEPS_OF_LINES, BOOKS_OF_LINES, REST_OF_LINES, START_OF_LINES, SOLVER[1])
 
 

@@ -242,7 +242,7 @@ def values_of_pairs(model: NetworkModel, shared: SharedContact | None, states: S
         found |= {f"{at}/{key}": np.zeros((nb, 3) if key == "force" else nb) for key in KEYS[a == b :]}
     if shared is None or not pairs:
         return found
-    lines, mine = Lines(shared.contact, shared.s), [states[k] for k in shared.lines]
+    lines, mine = Lines(shared.contact, shared.line), [states[k] for k in shared.lines]
     for output in range(nb):
         touch = np.concatenate([x.touch[output] for x in mine])
         if not touch.any():

@@ -340,7 +340,8 @@ class SharedContact(ContactBooks):
                 h[begin : begin + x.line.h.size] = x.line.h
             spin[begin : begin + x.line.spin.size] = x.line.spin
         blank = blank_line(s.size - 1)
-        self._line = blank._replace(s=s, h=h, spin=spin.astype(blank.spin.dtype))
+        # arc lengths of the nodes of all of them, with gaps between two
+        self.line = blank._replace(s=s, h=h, spin=spin.astype(blank.spin.dtype))
         super().__init__(contact, 0.5 * (s[1:] + s[:-1]))
         self._nodes = nodes
         self.beside = np.array([SHARED, 0, 0], np.int64)  # the call of the lines but the last
@@ -350,11 +351,6 @@ class SharedContact(ContactBooks):
         self._inner, self._jobs = Table(blank_contact_job), (Table(blank_shared_job), Table(blank_shared_job))
         self._touch = np.zeros((3, s.size))
 
-    @property
-    def s(self) -> Floats:
-        """(N+1,) m, arc lengths of the nodes of all of them, with gaps between two."""
-        return self._line.s
-
     def put(self, strands: Sequence[TouchingLine]) -> None:
         """Take these lines, which differ in numbers from those here, on sample points that stay as many."""
         of = [strand_of(*x[:4]) for x in strands]
@@ -363,8 +359,8 @@ class SharedContact(ContactBooks):
         width = self.contact.width
         self.contact.numbers.widest, self.contact.numbers.narrowest = width.max(), width.min()
         self._own = [x.line.s.copy() for x in strands]
-        self._line.s[:] = self._places(self.starts)
-        self._line.h[:] = np.diff(self._line.s)
+        self.line.s[:] = self._places(self.starts)
+        self.line.h[:] = np.diff(self.line.s)
 
     def _places(self, starts: Floats) -> Floats:
         """(N+1,) m, arc lengths of the nodes of all lines as parts of the one that begin there."""
@@ -461,8 +457,8 @@ class SharedContact(ContactBooks):
         if remeshed:
             saved = self._shifted(saved)
         elif "starts" in saved:  # of the lengths that lines had when their arrays were made
-            self._line.s[:] = self._places(saved["starts"])
-            self._middles = 0.5 * (self._line.s[1:] + self._line.s[:-1])
+            self.line.s[:] = self._places(saved["starts"])
+            self._middles = 0.5 * (self.line.s[1:] + self.line.s[:-1])
         for name, x in mine.items():
             x[:] = saved[name]
         super().restore(saved, t, remeshed)
@@ -508,9 +504,9 @@ class SharedContact(ContactBooks):
         self, numbers: NDArray[np.int64], books: Sequence[Books]
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """Table of the one line, and tables for both parities; numbers: (2, L, ..) jobs of all lines, books: theirs."""
-        cells, last = self._line.h.size, books[self.last]
+        cells, last = self.line.h.size, books[self.last]
         work = no_work()._replace(u=np.zeros((cells + 1, 3)), x=np.zeros((cells + 1, 5)))
-        self._inner.bind(line=self._line, ends=no_ends(), old=blank_state(cells), new=blank_state(cells), work=work)
+        self._inner.bind(line=self.line, ends=no_ends(), old=blank_state(cells), new=blank_state(cells), work=work)
         self._inner.bind(clock=last.clock, counts=np.zeros_like(last.counts), call=self.call, contact=self.contact)
         self._inner.bind(touch=self._touch, velocity=np.zeros((2, 3)))
         self._inner.bind(power=np.zeros_like(last.power), report=np.zeros_like(last.report))

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.contact import self_contact as k
-from hybrid.kernels.contact.self_contact_law import INNER, OUTER, add_gradient, add_product
+from hybrid.kernels.contact.self_contact_law import DISTANCE, INNER, NORMAL, OUTER, POINT, add_gradient, add_product
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.run.newton import workspace
 from hybrid.kernels.state.books import blank_books
 from hybrid.kernels.state.state import blank_line, blank_state, no_ends
-from hybrid.kernels.step.line_step import (
-    ASKED,
-    PREDICT,
-    SAFE_PART,
-    STAND,
-)
+from hybrid.kernels.step.line_step import ASKED, PREDICT, SAFE_PART, STAND
+from hybrid.outputs.observation import Lines
 from hybrid.solve.contact import SelfContact
 
 WIDTH = 0.1
@@ -209,6 +205,21 @@ def test_no_correction_leads_through_the_line(seed: int, far: float) -> None:
         assert part < 1.0
     gaps = (tangle.r + part * x)[43, 2] - (tangle.r + part * x)[10, 2]
     assert gaps > 0.5 * INNER * WIDTH
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_points_of_outputs_are_those_of_steps(name: str) -> None:
+    """The same places, feet and normals, and some beyond where the law begins, whatever room there is at first."""
+    tangle = Tangle(SHAPES[name])
+    tangle.energy(np.zeros_like(tangle.r))
+    contact, bears = tangle.contact.contact, np.ones(len(tangle.r))
+    lines, steps = Lines(contact, tangle.line), contact.points[: tangle.count, : NORMAL + 3]
+    seen = lines.points(tangle.r, bears)
+    narrow = lines._replace(contact=contact._replace(points=np.zeros((1, POINT))))
+    assert np.array_equal(seen, narrow.points(tangle.r, bears)) and len(seen) > tangle.count > 1
+    near = seen[seen[:, DISTANCE] < OUTER * WIDTH, : NORMAL + 3]
+    assert sorted(near.tolist()) == sorted(steps.tolist())
+    assert not len(lines.points(tangle.r, 0.0 * bears))
 
 
 @pytest.mark.parametrize("cells", [20, 40, 60, 100])

@@ -2,6 +2,9 @@
 
 The lines that may touch stand one after the other as one, their nodes and cells in rows; of one line alone there is
 that.  Between two lines is a cell that is none: no piece has it, and what follows another line is no way along a line.
+
+A run has the force per length of all contact at every node, of outputs, too.  What each pair of lines has of it follows
+from the same points of contact at the positions of an output, with a law of size 1 N and without friction.
 """
 
 from __future__ import annotations
@@ -16,7 +19,9 @@ from hybrid.kernels.algebra.kept_factors import SWEEP
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.contact.self_contact_law import (
     ARM,
+    DISTANCE,
     FIRST,
+    FORCE,
     GRIP,
     HOLD,
     INNER,
@@ -43,14 +48,11 @@ from hybrid.kernels.contact.self_distance import (
     nearest_feet,
     runs_on,
 )
-from hybrid.kernels.machine.compile import called, inner
-from hybrid.kernels.machine.references import NamedNumbers, by_reference
+from hybrid.kernels.machine.compile import called, inner, kernel
+from hybrid.kernels.machine.references import NamedNumbers, by_reference, reader
 from hybrid.kernels.state.books import RATES
-from hybrid.kernels.state.state import Floats
-from hybrid.kernels.step.line_step import (
-    COUPLE,
-    SAFE_PART,
-)
+from hybrid.kernels.state.state import Ends, Floats, Line, Rows, blanks
+from hybrid.kernels.step.line_step import COUPLE, SAFE_PART
 
 WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
 SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
@@ -65,6 +67,12 @@ PAIRS_OF_NODE = 8  # that are kept at most
 LEAST_KEEPS = 0.05  # diameters, of KEEPS
 FAR = 2.0  # diameters within which parts of the line are near each other
 LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of what is only foreseen
+# Diameters up to which points of an output count, beyond where the law begins: by FAINT of it.  Within a step positions
+# and forces lie on different curves, and what a node bears may have no point at which strands touch.
+BEYOND = 1.15
+FAINT = 1e-6  # also the part of the way from INNER to OUTER in which the law grows no more
+# phi' of `barrier` at the end of that part, of the size 1 N, over the length of the way.
+STEEPEST = 2.0 * (FAINT - 1.0) * math.log(FAINT) + (FAINT - 1.0) ** 2 / FAINT
 
 
 class ContactNumbers(NamedNumbers):
@@ -361,12 +369,28 @@ def limit_part(line, ends, contact, p, q, width, moved):
             numbers.part = room / moved
 
 
+@inner
+def foot_within(kind, r, p, u, q, reach):
+    """The foot of the point at u of piece p on piece q, and whether it is within `reach`, m, where no line runs on."""
+    x = spline_point(r, p, spline_weights(kind, p, u))
+    v, side = foot(kind, r, q, x)
+    away = sub(x, spline_point(r, q, spline_weights(kind, q, v)))
+    runs = side != 0 and kind[q + side] == WITHIN
+    return Foot(q, v, side != 0), not runs and dot(away, away) < reach * reach
+
+
+@inner
+def length_at(line, contact, p, u):
+    """Length, m, of a sample point at u of piece p: half of it, since each strand has points."""
+    before, after = end_factors(contact.kind, p)
+    return 0.5 * ((1.0 - u) * before * line.h[p - 1] + u * after * line.h[p]) / contact.samples[p]
+
+
 @called
 def gather(line, contact, p, q, width):
     """Keep the points of contact of piece p with their feet on piece q."""
     kind, r, counts, numbers = contact.kind, contact.at, contact.counts, contact.numbers
     count, nearest = contact.samples[p], OUTER * width
-    before, after = end_factors(kind, p)
     fast = IMPACT * numbers.speed * numbers.speed
     size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
     g = -1
@@ -375,21 +399,14 @@ def gather(line, contact, p, q, width):
         if g == count:
             return
         u = (g + 0.5) / count
-        x = spline_point(r, p, spline_weights(kind, p, u))
-        v, side = foot(kind, r, q, x)
-        if side != 0 and kind[q + side] == WITHIN:
-            continue
-        away = sub(x, spline_point(r, q, spline_weights(kind, q, v)))
-        if not dot(away, away) < nearest * nearest:
+        at, touches = foot_within(kind, r, p, u, q, nearest)
+        if not touches:
             continue
         if counts.points == contact.points.shape[0]:
             counts.overflow = 1
             return
         row = contact.points[counts.points]
-        length = (
-            0.5 * ((1.0 - u) * before * line.h[p - 1] + u * after * line.h[p]) / count
-        )  # half: each strand has points
-        energy = note_point(kind, r, p, u, Foot(q, v, side != 0), width, size, length, row)
+        energy = note_point(kind, r, p, u, at, width, size, length_at(line, contact, p, u), row)
         numbers.energy += energy
         a, b = contact.of[p], contact.of[q]
         contact.shares[a, WITHIN_LINE if a == b else BETWEEN] += 0.5 * energy
@@ -567,3 +584,64 @@ def first_in_contact(contact, first, n):
         if contact.marks[first + i] != 0:
             return i
     return n + 1
+
+
+# --- outputs --------------------------------------------------------------------------------------
+
+
+class PointsJob(NamedTuple):
+    """Arguments of `observe_points`."""
+
+    line: Line
+    ends: Ends
+    contact: Contact
+    r: Rows  # (N+1, 3) m, of an output
+    touch: Floats  # (N+1,) N/m, of all contact, at the nodes
+    points: Rows  # (C, POINT)
+
+
+read_points = reader(blanks(PointsJob)())
+
+
+@inner
+def bears(job, p):
+    """Whether p is a piece whose nodes all bear a force."""
+    touch = job.touch
+    return job.contact.kind[p] == WITHIN and touch[p - 1] > 0.0 and touch[p] > 0.0 and touch[p + 1] > 0.0
+
+
+@called
+def add_points(job, p, q, count):
+    """Enter points of piece p with their feet on piece q behind `count` rows, while there is room; how many there are."""
+    contact, r = job.contact, job.r
+    width = 0.5 * (contact.width[p] + contact.width[q])
+    for g in range(contact.samples[p]):
+        u = (g + 0.5) / contact.samples[p]
+        at, counts = foot_within(contact.kind, r, p, u, q, BEYOND * width)
+        if not counts:
+            continue
+        if count < job.points.shape[0]:
+            row, length = job.points[count], length_at(job.line, contact, p, u)
+            note_point(contact.kind, r, p, u, at, width, 1.0, length, row)
+            law = length / ((OUTER - INNER) * width)
+            row[FORCE] = max(row[FORCE], -law * STEEPEST) - law * FAINT * max(BEYOND - row[DISTANCE] / width, 0.0)
+        count += 1
+    return count
+
+
+@kernel
+def observe_points(table):
+    """Find points of contact of pieces that bear a force; how many there are, also where there is no room for all.
+
+    Of a row of `points` only pieces, weights, normal, places and FORCE are of the law of outputs.
+    """
+    job, count = read_points(table), 0
+    contact, width, n = job.contact, job.contact.width, job.line.h.shape[0]
+    for p in range(1, n):
+        if not bears(job, p):
+            continue
+        for q in range(p + 1, n):
+            near = bears(job, q) and hull_distance(contact.kind, job.r, p, q) < BEYOND * 0.5 * (width[p] + width[q])
+            if near and may_touch(job.line, job.ends, contact, p, q):
+                count = add_points(job, q, p, add_points(job, p, q, count))
+    return count
