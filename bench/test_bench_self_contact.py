@@ -16,14 +16,7 @@ import pytest
 import hybrid
 from hybrid.kernels.contact.self_contact import contact_task
 from hybrid.kernels.march.energies import Observed, observe
-from hybrid.kernels.step.line_step import (
-    ACCEPT,
-    ASKED,
-    COUPLE,
-    JUDGE,
-    PREDICT,
-    SAFE_PART,
-)
+from hybrid.kernels.step.line_step import ACCEPT, ASKED, COUPLE, JUDGE, PREDICT, SAFE_PART
 from tests.inside import OnlyLine
 
 pytestmark = pytest.mark.bench

@@ -36,13 +36,7 @@ from hybrid.kernels.run.newton import block_rows, out_of_balance, workspace_of
 from hybrid.kernels.state.books import Books, blank_books
 from hybrid.kernels.state.report import FORCE_A, NET_A, ROTARY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_line, blank_state, no_ends, no_work
-from hybrid.kernels.step.line_step import (
-    ADDRESS,
-    ASKED,
-    NEAR,
-    SHARED,
-    STAND,
-)
+from hybrid.kernels.step.line_step import ADDRESS, ASKED, NEAR, SHARED, STAND
 from hybrid.model.contents import Touching
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many

@@ -11,9 +11,7 @@ from random_scenes import random_scene
 
 import hybrid
 from hybrid.kernels.state.books import FRICTION
-from hybrid.kernels.step.line_step import (
-    NEAR,
-)
+from hybrid.kernels.step.line_step import NEAR
 from hybrid.solve.stepper import NetworkState
 from hybrid.view.summary import facts_of
 from tests.inside import OnlyLine

@@ -77,18 +77,7 @@ from hybrid.kernels.state.report import (
     TOUCHES,
 )
 from hybrid.kernels.state.state import Ends, Line, Rows, State, Work, blanks
-from hybrid.kernels.step.line_step import (
-    ACCEPT,
-    ASKED,
-    COUPLE,
-    FIND,
-    JUDGE,
-    NEAR,
-    PREDICT,
-    RADIUS,
-    SAFE_PART,
-    STAND,
-)
+from hybrid.kernels.step.line_step import ACCEPT, ASKED, COUPLE, FIND, JUDGE, NEAR, PREDICT, RADIUS, SAFE_PART, STAND
 from hybrid.kernels.step.step_control import before_fixed, radius_of_step, scheme
 
 # --- a correction of Newton's method -----------------------------------------------------------

@@ -49,7 +49,7 @@ class NetworkJob(NamedTuple):
     """
 
     asked: NetworkTask
-    tables: NumberRows  # (L, ..) jobs of the lines (kernels.run.network_run), their task ASSEMBLY
+    tables: NumberRows  # (L, ..) jobs of the lines (kernels.run.network_run), their task ASSEMBLY or ITERATION
     numbers: Rows  # the same memory
     # (L, 2) points, then bodies, that start and end are joined to, -1: none; HELD: an end that is held where the start is
     # joined, whose last block is left unsolved: a straight line that does not stretch has no tension of its own

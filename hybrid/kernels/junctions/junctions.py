@@ -31,17 +31,7 @@ from hybrid.kernels.junctions.bodies import (
     own_force,
     size_of_moves,
 )
-from hybrid.kernels.junctions.borders import (
-    END,
-    FAR,
-    HELD,
-    NONE,
-    START,
-    STRENGTH,
-    TURNED,
-    read_border,
-    read_network,
-)
+from hybrid.kernels.junctions.borders import END, FAR, HELD, NONE, START, STRENGTH, TURNED, read_border, read_network
 from hybrid.kernels.junctions.joined_lines import (
     COLUMNS,
     END_TURN,

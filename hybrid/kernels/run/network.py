@@ -27,13 +27,7 @@ from hybrid.kernels.junctions.bodies import (
     put,
     put_matrix,
 )
-from hybrid.kernels.junctions.borders import (
-    END,
-    NONE,
-    START,
-    ask,
-    read_network,
-)
+from hybrid.kernels.junctions.borders import END, NONE, START, ask, read_network
 from hybrid.kernels.junctions.junctions import move_joints
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
@@ -42,19 +36,8 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller
 from hybrid.kernels.march.energies import book_work, find_powers
 from hybrid.kernels.march.march import first_bad, measure
-from hybrid.kernels.state.books import (
-    HEAD,
-    RATES,
-    SAMPLE_POSITION,
-)
-from hybrid.kernels.state.report import (
-    ENDED,
-    LOCAL_ERROR,
-    RESIDUAL,
-    SEABED_ENERGY,
-    SLACKEST_CELL,
-    TOUCHES,
-)
+from hybrid.kernels.state.books import HEAD, RATES, SAMPLE_POSITION
+from hybrid.kernels.state.report import ENDED, LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST_CELL, TOUCHES
 from hybrid.kernels.state.report import TURNED as TURNED_AXES
 from hybrid.kernels.step.accept import (
     SAME_TIME,

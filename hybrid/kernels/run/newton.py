@@ -3,7 +3,7 @@
 Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
 tensions, frames and rates.  Of joined lines each is marched by the kernel of a line, which is called by its address.
 
-What it works on: kernels.step.line_step; what is beside the band of a line: kernels.step.line_step.  What couples lines is a border, points and
+What it works on, and what is beside the band of a line: kernels.step.line_step.  What couples lines is a border, points and
 bodies as well; the loop knows them by their list alone (kernels.junctions.borders).
 `plane` and `space`: for which kind of line (kernels.march.march); numba drops what stands behind `is not None` of what is
 None, so that neither solution is compiled with the other.
@@ -24,14 +24,7 @@ import numpy as np
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH, substitute
 from hybrid.kernels.algebra.plane import WIDE, substitute_planar
 from hybrid.kernels.junctions.bodies import book_bodies, start_here
-from hybrid.kernels.junctions.borders import (
-    FAR,
-    STRENGTH,
-    TURNED,
-    ask,
-    read_network,
-    task_of,
-)
+from hybrid.kernels.junctions.borders import FAR, STRENGTH, TURNED, ask, read_network, task_of
 from hybrid.kernels.laws.tension_torque import COUPLES
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.machine.compile import inner, kernel
@@ -51,17 +44,7 @@ from hybrid.kernels.run.network import (
     size_up,
 )
 from hybrid.kernels.state.report import FREE, PLANAR, REMEMBERS, REPORT_SIZE, RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.state.state import (
-    Ends,
-    Floats,
-    Line,
-    Sea,
-    State,
-    Work,
-    no_torsion,
-    remembers,
-    slip_size,
-)
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, no_torsion, remembers, slip_size
 from hybrid.kernels.step.line_step import (
     ASSEMBLY,
     BALANCE,
