@@ -348,10 +348,14 @@ class ObservedStates:
             return np.moveaxis(self._varied[name][:, at], 0, -1)
         return np.asarray(getattr(self.line, name)[at][..., None])
 
-    def lines(self) -> list[Line]:
-        """The line of each output, where it is another one in every output; else none."""
-        each = range(self.batch.t.size if self._varied else 0)
-        return [self.line._replace(**{name: x[k] for name, x in self._varied.items()}) for k in each]
+    @property
+    def varies(self) -> bool:
+        """Whether the line is another one in every output."""
+        return bool(self._varied)
+
+    def line_of(self, k: int) -> Line:
+        """The line at output k."""
+        return self.line._replace(**{name: x[k] for name, x in self._varied.items()})
 
     # ---- how its arrays are laid out ----------------------------------------------------------
 

@@ -172,20 +172,20 @@ class Diagnostics:
         if model is not self._model:
             self._model, self._longest = model, 1.0 + borne_strain(model)
 
-    def _places(self) -> NDArray[np.int64]:
+    def _places(self, line: Line) -> NDArray[np.int64]:
         """Nodes of `_noted_bends`."""
-        line = self._model.line
         loads = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
         return np.array([0, line.h.size, *loads])
 
-    def _note_bend(self, t: float, node: int, bend: float, tension: Floats) -> None:
+    def _note_bend(self, t: float, node: int, bend: float, tension: Floats, line: Line) -> None:
         """A rod bends by an angle (rad) at a node more than its cells show."""
-        self.note(t, node, "unresolved bend", self._bend_text(node, bend, tension))
-        here = self._places() == node
+        self.note(t, node, "unresolved bend", self._bend_text(node, bend, tension, line), line)
+        here = self._places(line) == node
         self._noted_bends[here] = np.minimum(self._noted_bends[here], t)
 
-    def note(self, t: float, node: int, kind: str, text: str) -> None:
-        s = float(self._model.line.s[node])
+    def note(self, t: float, node: int, kind: str, text: str, line: Line | None = None) -> None:
+        """An event at a node; line: as it was at t, None: as it is now."""
+        s = float((line or self._model.line).s[node])
         self.events.event(t, s, s, kind, text)
 
     def friction_neglected(self, state: State, key: str, shares: bool = False, not_settled: str = "") -> None:
@@ -295,7 +295,7 @@ class Diagnostics:
             return None
         node, twisted = int(sharp[1]), int(sharp[3])
         if bend > self._bend:
-            self._note_bend(t, node, bend, state.T)
+            self._note_bend(t, node, bend, state.T, self._model.line)
             self._bend = 1.5 * bend
         if twist > self._twist:
             text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
@@ -303,9 +303,8 @@ class Diagnostics:
             self._twist = 1.5 * twist
         return (Outcome.TWISTED_TOO_FAR, twisted) if twist > LARGEST_TWIST else None
 
-    def _bend_text(self, node: int, bend: float, T: Floats) -> str:
-        line, s = self._model.line, float(self._model.line.s[node])
-        cell = min(node, line.h.size - 1)
+    def _bend_text(self, node: int, bend: float, T: Floats, line: Line) -> str:
+        s, cell = float(line.s[node]), min(node, line.h.size - 1)
         first, tension = float(line.h[cell]), float(T[cell])
         stiffness = float(line.kb[node, :2].max() * line.hn[node])
         leaving = float(np.sqrt(stiffness / tension)) if tension > 0.0 else np.inf
@@ -438,7 +437,7 @@ class Diagnostics:
         joints = joints[~np.isin(joints, seen.end_nodes)]
         joints = joints[~np.isin(line.s[joints], model.attached)]
         if joints.size:
-            kinked = kinks_at(joints, seen.bends, line.hn)[:, 0] > self._kink
+            kinked = kinks_at(joints, seen.bends, line.hn[:, None])[:, 0] > self._kink
             found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
         layers = bool(model.attached) | seen.has_element(0) | seen.has_element(1)
         found |= layers
@@ -490,49 +489,51 @@ class Diagnostics:
         line, batch = self._model.line, seen.batch
         flexible = (line.spin[:-1] == 0) & (line.spin[1:] == 0) & ~np.isin(line.s[1:-1], self._model.attached)
         if flexible.any():
-            length = line.hn[1:-1]
+            length = seen.of_line("hn", slice(1, -1)).T
             half = np.where(flexible, 0.5 * seen.bends.T[:, 1:-1] * length, 0.0)  # tan(x/2) of a turn by x
-            for k in np.flatnonzero(half.max(axis=1) > np.tan(0.5 * min(self._fold, np.pi))):
-                self._note_fold(float(batch.t[k]), 2.0 * np.arctan(half[k]))
-            for k in np.flatnonzero((half * length).max(axis=1) > 4.0 * self._off):  # the sag is no larger than this
-                sag = 2.0 * np.arctan(half[k]) * length / 8.0
-                if sag.max() > self._off:
-                    self._note_sag(float(batch.t[k]), sag)
+            for k in np.flatnonzero(half.max(axis=1) > np.tan(0.5 * min(self._fold, np.pi))).tolist():
+                self._note_fold(float(batch.t[k]), 2.0 * np.arctan(half[k]), seen.line_of(k))
+            for k in np.flatnonzero(
+                (half * length).max(axis=1) > 4.0 * self._off
+            ).tolist():  # the sag is no larger than this
+                then = seen.line_of(k)
+                self._note_sag(float(batch.t[k]), 2.0 * np.arctan(half[k]) * then.hn[1:-1] / 8.0, then)
             self._negative_between_cells(seen)
         self._kinks(seen)
-        self._layers(batch)
+        self._layers(seen)
         layer = None if self._section else hidden_layer(self._model, seen)
         if layer is not None:
             rod = bool(line.spin[layer.node if layer.stiffness[1] < layer.stiffness[0] else layer.node - 1])
-            text = layer_text(layer, float(line.s[layer.node]), rod)
-            self.note(float(batch.t[layer.output]), layer.node, "unresolved change of section", text)
+            then = seen.line_of(layer.output)
+            text = layer_text(layer, float(then.s[layer.node]), rod)
+            self.note(float(batch.t[layer.output]), layer.node, "unresolved change of section", text, then)
             self._section = True
         if not self._weight:
             self._bends_by_weight(seen)
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = planes_under(sea, batch.r.reshape(-1, 3))[1].reshape(batch.r.shape[:2]) - 0.5 * sea.onset
-            for k in np.flatnonzero(depth.max(axis=1) > self._sunk):
+            for k in np.flatnonzero(depth.max(axis=1) > self._sunk).tolist():
                 node = int(np.argmax(depth[k]))
                 if depth[k, node] > self._sunk:
-                    text = f"the line lies {depth[k, node]:.3g} m deep in the seabed at s = {line.s[node]:g} m"
+                    then = seen.line_of(k)
+                    text = f"the line lies {depth[k, node]:.3g} m deep in the seabed at s = {then.s[node]:g} m"
                     where = f"{text}: is its stiffness in N/m per m of cable?"
-                    self.note(float(batch.t[k]), node, "deep in the seabed", where)
+                    self.note(float(batch.t[k]), node, "deep in the seabed", where, then)
                     self._sunk = 3.0 * float(depth[k, node])
-
         if line.bits & OBSTACLES:
-            self._obstacles(batch)
+            self._obstacles(seen)
 
-    def _obstacles(self, batch: Batch) -> None:
+    def _obstacles(self, seen: Observation) -> None:
         """Report lines deep in an obstacle or through it, and cells too long for it.
 
         Cells do not follow its radius, or it may pass between their nodes.
         """
-        line, sea = self._model.line, self._model.sea
-        longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
-        met = cells_met(sea.values.carried, line.s) if sea.values.carried.size else None
+        sea, batch = self._model.sea, seen.batch
         for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
-            around = self._around(batch, k)
+            line, around = seen.line_of(k), self._around(batch, k)
+            longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
+            met = cells_met(sea.values.carried, line.s) if sea.values.carried.size else None
             rows = around.obstacles
             within = depths_in_obstacles(around, r, line.s, met)
             which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
@@ -544,7 +545,7 @@ class Diagnostics:
                     f"{line.s[node]:g} m, or has passed through it between two nodes: make "
                     f"{key}.stiffness larger, time.step smaller or add cells"
                 )
-                self.note(t, node, "deep in an obstacle", text)
+                self.note(t, node, "deep in an obstacle", text, line)
                 self._within = 3.0 * float(within[which, node])
             if self._round:
                 continue
@@ -557,14 +558,14 @@ class Diagnostics:
                     f"cells of {longest[node]:.2g} m lie on obstacle {name} at s = {line.s[node]:g} m, whose radius is "
                     f"{radius:.2g} m: cells of {radius / CELLS_PER_RADIUS:.2g} m would follow it"
                 )
-                self.note(t, node, "unresolved bend", text)
+                self.note(t, node, "unresolved bend", text, line)
                 self._round = True
             elif not self._between:
-                self._pass_between(t, r, around, met)
+                self._pass_between(t, r, around, met, line)
 
-    def _pass_between(self, t: float, r: Floats, sea: Sea, met: Floats | None) -> None:
+    def _pass_between(self, t: float, r: Floats, sea: Sea, met: Floats | None, line: Line) -> None:
         """Cells longer than an obstacle is thick, and so near to it that it may pass between their nodes untouched."""
-        h, gap = self._model.line.h, distances(sea, r)
+        h, gap = line.h, distances(sea, r)
         gap = np.maximum(np.minimum(gap[:, :-1], gap[:, 1:]), 0.0)  # of the nearer node of each cell
         wide = 2.0 * half_thickness(sea.obstacles)
         missed = (h > wide[:, None]) & (gap < 0.5 * h)
@@ -575,47 +576,48 @@ class Diagnostics:
         which, cell = (int(i) for i in np.argwhere(missed)[0])
         name, thick = self._model.sea.names[which], wide[which]
         text = (
-            f"at s = {self._model.line.s[cell]:g} m the line is {gap[which, cell]:.2g} m from obstacle {name}, which "
+            f"at s = {line.s[cell]:g} m the line is {gap[which, cell]:.2g} m from obstacle {name}, which "
             f"may pass between two nodes without touching one: cells are {h[cell]:.2g} m long, and cells of "
             f"{thick:.2g} m would meet it"
         )
-        self.note(t, cell, "unresolved contact", text)
+        self.note(t, cell, "unresolved contact", text, line)
         self._between = True
 
     def _negative_between_cells(self, seen: Observation) -> None:
         """A tension below 0 in a bend of a catenary where its cell is taut: from cell to cell it goes on straight."""
-        line, tension, s = self._model.line, seen.tension, seen.grid.s
-        cell = np.clip(np.searchsorted(line.s, s) - 1, 0, line.h.size - 1)
-        turn = 2.0 * np.arctan(0.5 * seen.bends * line.hn[:, None])
+        line, tension, points = self._model.line, seen.tension, seen.grid.points
+        each = zip(seen.of_line("s", slice(None)).T, points.T, strict=True)
+        cells = np.stack([np.clip(np.searchsorted(x, y) - 1, 0, line.h.size - 1) for x, y in each], axis=1)
+        turn = 2.0 * np.arctan(0.5 * seen.bends * seen.of_line("hn", slice(None)))
         turn[1:-1] = np.maximum(turn[1:-1], np.maximum(turn[:-2], turn[2:]))  # at a node, and at those beside it
         bent = np.maximum(turn[:-1], turn[1:]) > TURNS_A_LITTLE
-        there = bent[cell] & (line.spin[cell] == 0)[:, None] & (seen.T[cell] >= 0.0)
+        there = np.take_along_axis(bent & (line.spin == 0)[:, None] & (seen.T >= 0.0), cells, axis=0)
         largest = np.maximum(np.abs(tension).max(axis=0), NOTHING * self._model.tension_scale)
         part = np.where(there, -tension, 0.0) / largest
         for k in np.flatnonzero(part.max(axis=0) > self._negative):
-            at = int(np.argmax(part[:, k]))
+            at, column = int(np.argmax(part[:, k])), k if cells.shape[1] > 1 else 0
             if part[at, k] > self._negative:
+                s, carried = float(points[at, column]), seen.T[cells[at, column], k]
                 text = (
-                    f"between cells the tension comes out as {tension[at, k]:.3g} N at s = {s[at]:g} m, where the cell "
-                    f"of a catenary carries {seen.T[cell[at], k]:.3g} N: it is too long for the bend there; add cells, "
-                    "or make it a rod"
+                    f"between cells the tension comes out as {tension[at, k]:.3g} N at s = {s:g} m, where the cell of "
+                    f"a catenary carries {carried:.3g} N: too long for the bend there; add cells, or make it a rod"
                 )
-                self.events.event(float(seen.batch.t[k]), float(s[at]), float(s[at]), "unresolved bend", text)
+                self.events.event(float(seen.batch.t[k]), s, s, "unresolved bend", text)
                 self._negative = 1.5 * float(part[at, k])
 
-    def _note_fold(self, t: float, turn: Floats) -> None:
+    def _note_fold(self, t: float, turn: Floats, line: Line) -> None:
         node = int(np.argmax(turn)) + 1
         if turn[node - 1] > self._fold:
             text = f"the catenary turns by {np.degrees(turn[node - 1]):.0f} deg from one cell to the next at s = "
-            fix = f"{self._model.line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
-            self.note(t, node, "unresolved bend", text + fix)
+            fix = f"{line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
+            self.note(t, node, "unresolved bend", text + fix, line)
             self._fold = 1.5 * float(turn[node - 1])
 
-    def _note_sag(self, t: float, sag: Floats) -> None:
+    def _note_sag(self, t: float, sag: Floats, line: Line) -> None:
         node = int(np.argmax(sag)) + 1
         if sag[node - 1] > self._off:
-            text = f"at s = {self._model.line.s[node]:g} m the catenary sags by {sag[node - 1]:.2g} m below its chords"
-            self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
+            text = f"at s = {line.s[node]:g} m the catenary sags by {sag[node - 1]:.2g} m below its chords"
+            self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells", line)
             self._off = 3.0 * float(sag[node - 1])
 
     def _kinks(self, seen: Observation) -> None:
@@ -625,50 +627,51 @@ class Diagnostics:
         joints = joints[~np.isin(line.s[joints], self._model.attached)]
         if not joints.size:
             return
-        kinks = kinks_at(joints, seen.bends, line.hn)
-        for k in np.flatnonzero(kinks.max(axis=0) > self._kink):
+        kinks = kinks_at(joints, seen.bends, seen.of_line("hn", slice(None)))
+        for k in np.flatnonzero(kinks.max(axis=0) > self._kink).tolist():
             node = int(joints[np.argmax(kinks[:, k])])
             kink = float(kinks[:, k].max())
             if kink <= self._kink:
                 continue
+            then = seen.line_of(k)
             keys = "model.zones" if self._model.layout is None else "model.tolerance, model.force_catenary"
             text = (
-                f"the rod and the catenary that meet at s = {line.s[node]:g} m form a kink of {np.degrees(kink):.0f} "
+                f"the rod and the catenary that meet at s = {then.s[node]:g} m form a kink of {np.degrees(kink):.0f} "
                 f"deg, because their joint passes no moment: curvature and moment of the bend are missing; move this "
                 f"border of the zones to where the line is straight ({keys}), or take model: rod"
             )
-            self.note(float(batch.t[k]), node, "kink at joint", text)
+            self.note(float(batch.t[k]), node, "kink at joint", text, then)
             self._kink = 1.5 * kink
 
-    def _layers(self, batch: Batch) -> None:
+    def _layers(self, seen: Observation) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
-        line, last = self._model.line, self._model.line.h.size
+        line, last, batch = self._model.line, self._model.line.h.size, seen.batch
         if not line.element.any():
             return
         d = batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
         tangents = batch.frame[:, :, 2::3]
         ends = [(0, tangents[:, 0], d[:, 0]), (last, d[:, -1], tangents[:, 1])]
-        places, found = self._places(), list[tuple[int, int, float]]()
+        places, found = self._places(line), list[tuple[int, int, float]]()
         inner = ((i, d[:, i - 1], d[:, i]) for i in places[2:].tolist() if 0 < i < last)
         for node, before, after in [*ends, *inner]:
             beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
             if not line.element[node] or not beside:
                 continue
             noted = self._noted_bends[places == node].min()
-            cell, stiffness = min(node, last - 1), batch.stiffness(node, line)[:, :2].max(axis=1) * line.hn[node]
-            thin = (batch.T[:, cell] * line.h[cell] ** 2 > stiffness) & (batch.t < noted)
+            cell, hn = min(node, last - 1), seen.of_line("hn", slice(None))
+            stiffness = batch.stiffness(node, line)[:, :2].max(axis=1) * hn[node]
+            thin = (batch.T[:, cell] * seen.of_line("h", cell) ** 2 > stiffness) & (batch.t < noted)
             angle = np.linalg.norm(after - before, axis=1) - float(np.linalg.norm(line.k0[node, :2]))
-            smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / line.hn[i] for i in beside], axis=0)
-            bad = np.flatnonzero(thin & (angle > ASKEW) & (smooth < LAYER * angle / line.hn[node]))
+            smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / hn[i] for i in beside], axis=0)
+            bad = np.flatnonzero(thin & (angle > ASKEW) & (smooth < LAYER * angle / hn[node]))
             found += [(int(k), node, float(angle[k])) for k in bad[:1]]
         for k, node, bend in sorted(found):
-            self._note_bend(float(batch.t[k]), node, bend, batch.T[k])
+            self._note_bend(float(batch.t[k]), node, bend, batch.T[k], seen.line_of(k))
 
     def _bends_by_weight(self, seen: Observation) -> None:
         """Bends of a rod almost without tension that are shorter than its cells."""
-        each: list[tuple[Line, slice]] = [(self._model.line, slice(None))]
-        if lines := seen.lines():
-            each = [(line, slice(k, k + 1)) for k, line in enumerate(lines)]
+        count = seen.batch.t.size if seen.varies else 1
+        each = [(seen.line_of(k), slice(k, k + 1) if seen.varies else slice(None)) for k in range(count)]
         for line, outputs in each:
             nodes, l, limits = too_long_for_weight(self._model.cable, line)
             if not nodes.size:

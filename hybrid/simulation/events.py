@@ -158,10 +158,10 @@ def slack_remedy(model: Model, outcome: Outcome, s: float | None) -> str:
 def kinks_at(joints: NDArray[np.int64], bends: Floats, lengths: Floats) -> Floats:
     """Angles (J, nb), rad, of joints beyond the larger bend on their sides.
 
-    bends: (N+1, nb) 1/m at nodes, 2 tan(x/2) over lengths (N+1,) m for an angle x.
+    bends: (N+1, nb) 1/m at nodes, 2 tan(x/2) over lengths (N+1, 1 or nb) m for an angle x.
     """
-    turn = 2.0 * np.arctan(0.5 * bends[joints] * lengths[joints, None])
-    return np.asarray(turn - np.maximum(bends[joints - 1], bends[joints + 1]) * lengths[joints, None])
+    turn = 2.0 * np.arctan(0.5 * bends[joints] * lengths[joints])
+    return np.asarray(turn - np.maximum(bends[joints - 1], bends[joints + 1]) * lengths[joints])
 
 
 # Where energy is created.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -157,3 +158,14 @@ def test_a_swivel_near_the_far_end_of_a_line_that_is_paid_out_lets_it_turn() -> 
     assert free.position[-1] == pytest.approx(
         np.array([np.interp(free.s, plain.s, plain.position[-1, :, k]) for k in range(3)]).T, abs=1e-6 * LENGTH
     )
+
+
+def test_events_of_outputs_stand_on_the_line_as_it_was(tmp_path: Path) -> None:
+    """A bend that is seen at t = 0, looked at with outputs of later lines: where the end was, as a file has it."""
+    taut = {"kind": "clamped", "position": [8.02, 0, 0], "tangent": [1, 0, 0.3]}
+    start = {"ends.start.tangent": [1, 0, 0.3]}
+    scene = curled(0.4, 2.0, taut, **start, **{"mesh.cells": 16, "model": {"kind": "adaptive", "tolerance": 3e-3}})
+    with hybrid.run(scene) as kept, hybrid.run(scene, tmp_path / "run.h5") as written:
+        assert kept.events == written.events
+        places = {x.s_a for x in kept.events if x.kind == "unresolved bend" and x.t == 0.0}
+    assert places == {0.0, LENGTH}
