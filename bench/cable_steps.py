@@ -1,6 +1,10 @@
 """Processor time of a step of one cable, us, for whatever `hybrid` is imported: a case a line in, a time a line out.
 
 echo "100 rod 3" | python bench/cable_steps.py
+python bench/cable_steps.py plane
+
+The second compares the plane with space, in one process: medians of turns, and of the plane also without the small push
+out of it that a run carries along.
 """
 
 from __future__ import annotations
@@ -8,10 +12,13 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+import numpy as np
+
 import hybrid
+from hybrid.simulation.lone_planes import LonePlane
 
 CELLS, KINDS, DIMENSIONS = (20, 100, 1000), ("catenary", "rod", "zones"), (2, 3)
-STEPS = {20: 1500, 100: 400, 1000: 40}
+STEPS = {20: 20_000, 100: 5_000, 1000: 500}  # 0.1 s at least: the clock is read each 0.01 s
 CASES = [f"{cells} {kind} {dimension}" for cells in CELLS for kind in KINDS for dimension in DIMENSIONS]
 
 
@@ -45,7 +52,35 @@ def step(cells: int, kind: str, dimension: int) -> float:
         return 1e6 * float(cpu[-1] - cpu[first]) / (len(cpu) - 1 - first)
 
 
+def plane_beside_space(turns: int = 9) -> None:
+    """Medians of steps in the plane, in it without a push, and in space, and their ratios to space."""
+    begin = LonePlane.begin
+
+    def unpushed(self: LonePlane, *args: Any) -> None:
+        begin(self, *args)
+        self.speed = 0.0
+
+    for cells in CELLS:
+        for kind in KINDS:
+            took = []
+            for _ in range(turns):
+                row = []
+                for dimension, how in ((2, begin), (2, unpushed), (3, begin)):
+                    setattr(LonePlane, "begin", how)  # noqa: B010
+                    row.append(step(cells, kind, dimension))
+                took.append(row)
+            setattr(LonePlane, "begin", begin)  # noqa: B010
+            plane, alone, space = np.median(took, axis=0)
+            print(
+                f"{cells:5} {kind:9} {plane:7.1f} {alone:7.1f} {space:7.1f} us, {plane / space:.2f}, {alone / space:.2f}",
+                flush=True,
+            )
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["plane"]:
+        plane_beside_space()
+        sys.exit()
     for case in sys.stdin:
         cells, kind, dimension = case.split()
         print(step(int(cells), kind, int(dimension)), flush=True)

@@ -1,43 +1,62 @@
-"""What each constant of models, runs and accuracy moves: each is doubled and halved alone, until a scene changes.
+"""What each constant of models, runs and accuracy moves: doubled and halved, until an answer changes.
 
     pytest bench/test_bench_constants.py -m bench -n 0 -s
 
-Scenes are those of the digests, with error figures, and examples and defects that ask for an accuracy.  A constant is
-tried in scenes that call a function which reads it, as seen by the interpreter, the quickest first.  Constants of
-compiled kernels, and those that other constants are made of, are not tried here.  A constant that moves nothing is a guard
-that none of these scenes needs, a price of time or memory, or one that buys nothing: docs/evidence/accuracy.md.
+Scenes are those that tests compute (constant_scenes.py), those of the digests with error figures, and examples and
+defects that ask for an accuracy, the quickest first.  In each, all constants that a line reads which is run, and that have
+moved nothing yet, are changed at once; where the answer is another, halves of them, until one is found that alone moves
+it.  Constants of compiled kernels, and those that other constants are made of, are not tried here.  A constant that
+moves nothing is a guard that none of these scenes needs, a price of time or memory, or one that buys nothing:
+docs/evidence/constants.md.
+
+HYBRID_RECORDED: a folder of scenes that tests have been seen to compute; else they are run first.
+HYBRID_BENCH_ONLY: names of constants, module.NAME or NAME; `open`: those that the page calls so.
+HYBRID_BENCH_LONGEST: s, of the longest scene (1.5).  HYBRID_BENCH_PART: 0/2: each second scene.
+HYBRID_BENCH_WRITE: a file for what was found, a row of JSON each.
 """
 
 from __future__ import annotations
 
 import ast
 import faulthandler
+import json
 import math
+import os
+import re
+import signal
+import subprocess
 import sys
 import time as clock
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
-import numpy as np
 import pytest
 import yaml
+from constant_scenes import LONGEST, Asked, Facts, Read, again, inside, recorded, seen
 from digest_scenes import DEFECTS, EXAMPLES, at_rest, changed, moving
-from test_bench_digests import difference, digest
-
-import hybrid
-from hybrid.errors import HybridError
+from test_bench_digests import difference
 
 pytestmark = pytest.mark.bench
+ROOT = Path(__file__).parents[1]
 ROOMS = ("accuracy", "model", "simulation")
-# Limits beyond which a scene is said to be implausible: they refuse, and change no number.
-REFUSALS = ("hybrid.model.plausibility",)
+FOLDERS = (
+    "combinations",
+    "simulation",
+    "validation",
+    "model",
+    "outputs",
+    "solve",
+    "modal",
+    "designs",
+    "zones",
+    "scene",
+)
 SAME = 1e-12  # of the root mean square
-LONGEST = 2.0  # s of CPU time: scenes that take longer are left out
-# Scenes that are asked for an accuracy, without steps, mesh and model of their own.
+TOO_LONG = 20.0  # times the usual time, beyond which a computation is stopped
+# Examples and defects that are asked for an accuracy, without steps, mesh and model of their own.
 EXAMPLES_FREE = (
     "01_hanging_chain", "02_suspension", "05_cantilever", "06_whip", "07_forced_taut_cable", "rov_tether", "s_tether",
     "slack_on_seabed", "touchdown", "laying",
@@ -60,20 +79,22 @@ class Constant(NamedTuple):
     value: float
 
 
-class Uses(NamedTuple):
+class Place(NamedTuple):
     """Where a module has a constant: under a name of its own."""
 
     module: str
     name: str
 
 
+class StoppedError(BaseException):
+    """A computation took too long."""
+
+
 def constants() -> list[Constant]:
     """Numbers with a name in the rooms, as they are when the package is loaded; counters and codes too."""
     found = []
     for name, module in sorted(sys.modules.items()):
-        if not name.startswith("hybrid.") or name in REFUSALS:
-            continue
-        if name.split(".")[1] not in ROOMS or not module.__file__:
+        if not name.startswith("hybrid.") or name.split(".")[1] not in ROOMS or not module.__file__:
             continue
         for node in ast.parse(Path(module.__file__).read_text(encoding="utf-8")).body:
             targets = node.targets if isinstance(node, ast.Assign) else []
@@ -86,133 +107,186 @@ def constants() -> list[Constant]:
     return found
 
 
-def uses_of() -> dict[tuple[str, str], list[Uses]]:
+def asked_for() -> list[Constant]:
+    """Constants that are to be tried."""
+    only = os.environ.get("HYBRID_BENCH_ONLY", "")
+    names = {*only.split(",")} - {""}
+    if only == "open":
+        page = (ROOT / "docs" / "evidence" / "constants.md").read_text(encoding="utf-8")
+        rows = re.findall(r"^\| `(\w+)` \| (.*) \|.*: open \|$", page, re.M)
+        names = {f"{module}.{name}" for module, row in rows for name in re.findall(r"`(\w+)` =", row)}
+    return [x for x in constants() if not names or names & {x.name, f"{x.module.split('.')[-1]}.{x.name}"}]
+
+
+def places_of() -> dict[tuple[str, str], list[Place]]:
     """By module and name of a constant, all modules that have it, its own among them."""
-    found = defaultdict[tuple[str, str], list[Uses]](list)
+    found = defaultdict[tuple[str, str], list[Place]](list)
     for name, module in [*sys.modules.items()]:
         if not name.startswith("hybrid.") or not module.__file__:
             continue
         for node in ast.walk(ast.parse(Path(module.__file__).read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module:
                 for x in node.names:
-                    found[node.module, x.name].append(Uses(name, x.asname or x.name))
+                    found[node.module, x.name].append(Place(name, x.asname or x.name))
+    for x in constants():
+        found[x.module, x.name].append(Place(x.module, x.name))
     return found
 
 
-class Seen:
-    """What code of the package was called."""
-
-    def __init__(self) -> None:
-        self.read = set[tuple[str, str]]()  # file, and a name that a function of it reads
-        self._codes = set[Any]()
-
-    def __enter__(self) -> Seen:
-        sys.setprofile(self._called)
-        return self
-
-    def _called(self, frame: Any, event: str, _: Any) -> None:
-        code = frame.f_code
-        if event == "call" and code not in self._codes:
-            self._codes.add(code)
-            if "/hybrid/" in code.co_filename:
-                self.read |= {(code.co_filename, name) for name in code.co_names}
-
-    def __exit__(self, *_: Any) -> None:
-        sys.setprofile(None)
-
-
-def scenes() -> Iterator[tuple[str, dict[str, Any], bool]]:
-    """Name, tables, and whether it is at rest."""
-    for name, data in moving().items():
-        yield name, changed(data, {"output.errors": True}), False
-    yield from ((name, data, True) for name, data in at_rest().items())
+def own_scenes() -> Iterator[Asked]:
+    """Scenes of the digests with error figures, and examples and defects that ask for an accuracy."""
+    scenes = [("run", name, changed(data, {"output.errors": True})) for name, data in moving().items()]
+    scenes += [("static", name, data) for name, data in at_rest().items()]
     free = {"time.step": None, "mesh": None, "model": None}
     for path in [
         *(EXAMPLES / f"{name}.yaml" for name in EXAMPLES_FREE),
         *(DEFECTS / f"{x}.yaml" for x in DEFECTS_FREE),
     ]:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        yield f"{path.stem}, 5 %", changed(data, free | {"accuracy": "5%"}), False
+        scenes.append(("run", f"{path.stem}, 5 %", changed(data, free | {"accuracy": "5%"})))
+    for function, name, data in scenes:
+        asked = Asked(function, data, {}, False, name, 0.0, set())
+        again(asked, Path())  # compiles
+        begin = clock.process_time()
+        with seen() as read:
+            again(asked, Path())
+        yield asked._replace(cpu=clock.process_time() - begin, read=read)
 
 
-def facts(data: dict[str, Any], rest: bool) -> Any:
-    """What a run comes to: its digest, numbers beside it, and events, or why there is none."""
-    for module in [*sys.modules.values()]:
-        if getattr(module, "__name__", "").startswith("hybrid.") and not module.__name__.startswith("hybrid.kernels"):
+def corpus(folder: Path) -> list[Asked]:
+    """Scenes, the quickest first."""
+    known = os.environ.get("HYBRID_RECORDED")
+    if not known:
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "constant_scenes"]
+        paths = {"HYBRID_RECORD": str(folder / "asked"), "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'bench'}"}
+        subprocess.run(
+            [*command, *(f"tests/{x}" for x in FOLDERS)], cwd=ROOT, env=os.environ | paths, check=False, timeout=7200
+        )
+    found = recorded(Path(known) if known else folder / "asked") + [x for x in own_scenes() if x.cpu < 2 * LONGEST]
+    part, parts = (int(x) for x in os.environ.get("HYBRID_BENCH_PART", "0/1").split("/"))
+    return sorted(found, key=lambda x: x.cpu)[part::parts]
+
+
+def forget() -> None:
+    """Values that functions of the package keep."""
+    for name, module in [*sys.modules.items()]:
+        if name.startswith("hybrid.") and not name.startswith("hybrid.kernels"):
             for x in [*vars(module).values()]:
-                with suppress(Exception):
-                    x.cache_clear()
+                if hasattr(x, "cache_clear"):
+                    with suppress(Exception):
+                        x.cache_clear()
+
+
+def computed(asked: Asked, folder: Path, limit: float) -> Facts:
+    """What it comes to; limit: s."""
+
+    def stop(*_: Any) -> None:
+        raise StoppedError
+
+    forget()
+    signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, limit)
     try:
-        result = hybrid.static(data) if rest else hybrid.run(data)
-    except HybridError as error:
-        return str(error), {}, []
-    with result:
-        numbers = {k: v for k, v in result.attributes.items() if k.startswith("error_") or k == "cells"}
-        return digest(result), numbers, sorted((x.kind, round(x.t, 6)) for x in result.events)
+        return again(asked, folder)
+    except StoppedError:
+        return Facts(f"takes {TOO_LONG:g} times as long", {}, [])
+    except Exception as error:
+        return Facts(type(error).__name__, {}, [])
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def moved(old: Any, new: Any) -> str:
+def moved(old: Facts, new: Facts) -> str:
     """What is another now; empty: nothing."""
-    if isinstance(old[0], str) or isinstance(new[0], str):
-        return "" if old[0] == new[0] else "fails, or no longer"
-    by, what = difference(old[0], new[0])
+    if old.error != new.error:
+        return f"refused otherwise: {new.error[:60]!r}" if new.error else "no longer refused"
+    by, what = difference(old.digest, new.digest)
     if by > SAME:
         return f"{what} by {100 * by:.2g} %" if math.isfinite(by) else what
-    for name in old[1].keys() | new[1].keys():
-        a, b = old[1].get(name), new[1].get(name)
-        if a is None or b is None or not np.isclose(a, b, rtol=1e-9, equal_nan=True):
-            return name
-    return "events" if old[2] != new[2] else ""
+    for a, b in zip(old.words, new.words, strict=False):
+        if a != b:
+            return f"{a[0]}: other words"
+    return "" if len(old.words) == len(new.words) else "events"
 
 
-def tried(constant: Constant, uses: list[Uses], value: float, data: dict[str, Any], rest: bool) -> Any:
-    """Facts with another value of a constant; None: a run cannot be made with it."""
-    found: list[tuple[ModuleType, str]] = [(sys.modules[x.module], x.name) for x in uses]
-    found.append((sys.modules[constant.module], constant.name))
-    for module, name in found:
-        setattr(module, name, value)
-    try:
-        return facts(data, rest)
-    except Exception as error:
-        return f"{type(error).__name__}", {}, []
-    finally:
-        for module, name in found:
-            setattr(module, name, constant.value)
+class Trials:
+    """Scenes, what each comes to, and what constants move in them."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._scenes, self._places = folder, corpus(folder), places_of()
+        self._known = dict[int, Facts | None]()
+
+    def _usual(self, number: int) -> Facts | None:
+        """What a scene comes to; None: not the same each time."""
+        if number not in self._known:
+            one, two = (computed(self._scenes[number], self._folder, 60.0) for _ in range(2))
+            self._known[number] = None if moved(one, two) else one
+        return self._known[number]
+
+    def _with(self, group: Sequence[Constant], factor: float, number: int) -> Facts:
+        found = [(sys.modules[x.module], x.name, c.value) for c in group for x in self._places[c.module, c.name]]
+        for module, name, value in found:
+            setattr(module, name, type(value)(value * factor))
+        try:
+            scene = self._scenes[number]
+            return computed(scene, self._folder, TOO_LONG * max(scene.cpu, 0.2))
+        finally:
+            for module, name, value in found:
+                setattr(module, name, value)
+
+    def _one(self, group: Sequence[Constant], factor: float, number: int, usual: Facts) -> tuple[Constant, str] | None:
+        """A constant of a group that alone moves a scene, and what; None: they do so together alone."""
+        if len(group) == 1:
+            what = moved(usual, self._with(group, factor, number))
+            return (group[0], what) if what else None
+        for part in (group[: len(group) // 2], group[len(group) // 2 :]):
+            if len(part) == 1 or moved(usual, self._with(part, factor, number)):
+                found = self._one(part, factor, number, usual)
+                if found is not None:
+                    return found
+        return None
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """What each constant was first seen to move; then those that moved nothing, with how many scenes read them."""
+        left = {x: 0 for x in asked_for()}
+        for k, scene in enumerate(self._scenes):
+            which = [x for x in left if self._read(x) & scene.read]
+            usual = self._usual(k) if which else None
+            if usual is None:
+                continue
+            for x in which:
+                left[x] += 1
+            for factor in (2, 0.5):
+                group = [x for x in which if x in left and type(x.value)(x.value * factor) != x.value]
+                while group and moved(usual, self._with(group, factor, k)):
+                    found = self._one(group, factor, k, usual)
+                    if found is None:
+                        break
+                    constant, what = found
+                    group.remove(constant)
+                    tried = left.pop(constant)
+                    yield _row(constant, tried) | {"what": what, "factor": factor, "test": scene.test}
+        for constant, tried in left.items():
+            yield _row(constant, tried) | {"what": ""}
+
+    def _read(self, constant: Constant) -> Read:
+        places = self._places[constant.module, constant.name]
+        return {(inside(str(sys.modules[x.module].__file__)), x.name) for x in places}
 
 
-def test_what_constants_move(monkeypatch: pytest.MonkeyPatch) -> None:
+def _row(constant: Constant, tried: int) -> dict[str, Any]:
+    return {"module": constant.module, "name": constant.name, "value": constant.value, "tried": tried}
+
+
+def test_what_constants_move(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(EXAMPLES)  # files that scenes name
     faulthandler.cancel_dump_traceback_later()  # no other test takes so long
-    known = []
-    for name, data, rest in scenes():
-        facts(data, rest)  # compiles
-        begin = clock.process_time()
-        before = facts(data, rest)
-        cpu = clock.process_time() - begin
-        if cpu > LONGEST or moved(before, facts(data, rest)):
-            print(f"left out: {name}, {cpu:.1f} s{'' if cpu > LONGEST else ', which is not the same again'}")
-            continue
-        with Seen() as seen:
-            facts(data, rest)
-        known.append((cpu, name, data, rest, before, seen.read))
-    known.sort(key=lambda x: x[0])
-    uses = uses_of()
-    nothing, unread = [], []
-    for constant in constants():
-        at = [*uses[constant.module, constant.name], Uses(constant.module, constant.name)]
-        places = {(str(sys.modules[x.module].__file__), x.name) for x in at}
-        which = [x for x in known if places & x[-1]]
-        what = ""
-        for _cpu, name, data, rest, before, _ in which:
-            for factor in (2, 0.5):
-                value = type(constant.value)(constant.value * factor)
-                what = what or moved(before, tried(constant, at, value, data, rest))
-            if what:
-                print(f"{constant.module}.{constant.name} = {constant.value:g}: {name}: {what}", flush=True)
-                break
-        if not what:
-            (nothing if which else unread).append(constant)
-            print(f"{constant.module}.{constant.name} = {constant.value:g}: nothing in {len(which)} scenes", flush=True)
-    print(f"\nnothing moves with {len(nothing)}: {', '.join(f'{x.module}.{x.name}' for x in nothing)}")
-    print(f"no scene reads {len(unread)}: {', '.join(f'{x.module}.{x.name}' for x in unread)}")
-    assert known
+    write, nothing = os.environ.get("HYBRID_BENCH_WRITE"), 0
+    for found in Trials(tmp_path):
+        nothing += not found["what"]
+        what = f"{found['test']}: {found['what']}" if found["what"] else f"nothing in {found['tried']} scenes"
+        print(f"{found['module'].removeprefix('hybrid.')}.{found['name']} = {found['value']:g}: {what}", flush=True)
+        if write:
+            with Path(write).open("a", encoding="utf-8") as file:
+                file.write(json.dumps(found) + "\n")
+    print(f"nothing moves with {nothing}")

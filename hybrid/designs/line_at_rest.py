@@ -21,7 +21,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, ba
 from hybrid.linear.matrices import ANCHOR, load_layers
 from hybrid.model.build import Model
 from hybrid.model.ends import rotation
-from hybrid.model.sections import jump_points, output_points
+from hybrid.model.sections import SAME_PLACE, jump_points, output_points
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.run_line import observer_of
@@ -35,7 +35,6 @@ KINK, ROUGH = 0.3, 1e-7
 LEFT_OUT = PLANAR | WAVES | FRICTION
 # Of lines that are looked at together what has to be the same, and what results ask for that may differ.
 SAME, VARIES = ("element", "spin"), ("s", "h", "hn", "k0", "kb", "ck", "mass", "force", "rotary", "polar")
-SAME_PLACE = 1e-9  # part of the length within which a node is at a jump
 TURNED = 1e-9  # N m over N m, torque through catenary zones that is none
 
 

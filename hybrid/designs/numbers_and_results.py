@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
+from hybrid.model.sections import SAME_PLACE
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Invalid, Table, unit_of
 from hybrid.scene.read import read_text, scene_text, text_of
@@ -46,7 +47,7 @@ OF_TOUCHED = 3e-8  # of the number, or of the longest line for a coordinate
 # at least a radian.
 PART_OF_LENGTH, RADIAN = 0.1, math.degrees(1.0)
 # Of an output what is at arc lengths; part of the length within which one is at the end.
-OF_OUTPUT, NEAR = ("points", "history"), 1e-9
+OF_OUTPUT = ("points", "history")
 # Tables of how a scene is computed and written, and of what has names of its own.
 COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
 NAMED = ("lines", "points", "bodies", "obstacles")
@@ -171,7 +172,7 @@ def _on_line(places: Any, old: float, new: float) -> Any:
     """Arc lengths, m, on a line of another length; a number of places, or none, stays."""
     if not isinstance(places, tuple):
         return places
-    return tuple(sorted({new if x > new or abs(x - old) <= NEAR * old else x for x in places}))
+    return tuple(sorted({new if x > new or abs(x - old) <= SAME_PLACE * old else x for x in places}))
 
 
 def allowed(scene: AnyScene) -> AnyScene:

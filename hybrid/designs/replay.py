@@ -18,7 +18,7 @@ from hybrid.model.build import places_of
 from hybrid.model.contents import passing_each_other
 from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.resolution import Resolution, accuracy_of
-from hybrid.model.sections import NEAR
+from hybrid.model.sections import SAME_PLACE
 from hybrid.scene.network import Network
 from hybrid.scene.read import read_text, scene_text
 from hybrid.scene.root import Scene
@@ -158,7 +158,7 @@ def with_outputs(
 def at_nodes(nodes: Floats, more: Sequence[float]) -> tuple[float, ...]:
     """Output points, m: nodes and more, of which those that round-off alone tells apart are one."""
     points = np.unique([*nodes, *more])
-    return tuple(points[np.append(True, np.diff(points) > NEAR * nodes[-1])].tolist())
+    return tuple(points[np.append(True, np.diff(points) > SAME_PLACE * nodes[-1])].tolist())
 
 
 def _with_nodes(course: Course) -> Course:

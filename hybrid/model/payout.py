@@ -19,7 +19,7 @@ from hybrid.kernels.state.state import Floats, Line, slip_size
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of, torsion_zones
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Layout, LineOnBase, Zone
-from hybrid.model.sections import bending_stiffness, sleeves
+from hybrid.model.sections import SAME_PLACE, bending_stiffness, sleeves
 from hybrid.scene.analysis import AdaptiveModel
 from hybrid.scene.attachments import Spread
 from hybrid.scene.cable import Section
@@ -455,9 +455,6 @@ def _pieces(scene: LineScene, cable: Material, side: int, far: float) -> Floats:
 
 # How long a line that is paid out is when: the length over time, as polynomials, and what is asked of it.
 
-# Of the length of the cable: as much may the first one given differ from it, by round-off.
-SAME_LENGTH = 1e-9
-
 
 @contextmanager
 def naming_connection(name: str) -> Iterator[None]:
@@ -524,7 +521,7 @@ def _rows_of(path: str, length: float, where: str) -> dict[str, Floats]:
         for k in np.flatnonzero(x <= 0.0)[:1]:
             given = f"{name}, line {lines[k]}: length = {x[k]:.9g}"
             refuse_value(f"{where}.file", given, "lengths > 0, in m", "correct it")
-        if abs(x[0] - length) > SAME_LENGTH * length:
+        if abs(x[0] - length) > SAME_PLACE * length:
             given, expected = f"{name}, line {lines[0]}: length = {x[0]:.9g}", f"{length:.9g} m, that of the cable"
             refuse_value(f"{where}.file", given, expected, "the same length at t = 0, in m")
     return {key: np.column_stack([t, x])}
@@ -559,7 +556,7 @@ def _law_of_lengths(table: Floats, length: float, where: str) -> Floats:
     from scipy.interpolate import PPoly, make_interp_spline
 
     t, out = table.T
-    if abs(out[0] - length) > SAME_LENGTH * length:
+    if abs(out[0] - length) > SAME_PLACE * length:
         given, expected = f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable"
         refuse_value(f"{where}.lengths", given, expected, "the same length")
     rest = [(1, 0.0), (2, 0.0)]

@@ -165,8 +165,8 @@ def section_changes(scene: LineScene) -> tuple[float, ...]:
 
 # Where along the cable results are written, and where quantities may have two values.
 
-# Part of the length below which two places are one.
-NEAR = 1e-9
+# Part of the length by which two places, or lengths, that are one may differ by round-off.
+SAME_PLACE = 1e-9
 
 
 class OutputPoints(NamedTuple):
@@ -186,10 +186,10 @@ def output_points(scene: LineScene, longest: float | None = None, at_start: bool
     asked, length, jumps = scene.output.points, scene.length, jump_points(scene)
     ends = (length - (longest or length), length) if at_start else (0.0, longest or length)
     usual = np.linspace(*ends, asked) if isinstance(asked, int) else np.array(asked, float)
-    followed = (x for x in scene.output.history or () if all(abs(x - at) > NEAR * length for at in jumps))
+    followed = (x for x in scene.output.history or () if all(abs(x - at) > SAME_PLACE * length for at in jumps))
     more = [*jumps, *distinct(followed, length)]
     if more:
-        near = np.abs(usual[:, None] - np.array(more)).min(axis=1) <= NEAR * length
+        near = np.abs(usual[:, None] - np.array(more)).min(axis=1) <= SAME_PLACE * length
         usual = np.unique(np.concatenate([usual[~near], more]))
     return OutputPoints(usual, np.array(jumps, float))
 
@@ -215,7 +215,7 @@ def distinct(places: Iterable[float], length: float) -> list[float]:
     """Places (m) inside a cable of that length (m) in order, one of those that round-off alone tells apart."""
     out: list[float] = []
     for x in sorted(places):
-        if x - (out[-1] if out else 0.0) > NEAR * length and length - x > NEAR * length:
+        if x - (out[-1] if out else 0.0) > SAME_PLACE * length and length - x > SAME_PLACE * length:
             out.append(float(x))
     return out
 

@@ -25,10 +25,10 @@ from hybrid.kernels.state.report import PAYOUT_RATE
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import Along, Found, observe_obstacles, observed
 from hybrid.model.mesh import Zone
+from hybrid.model.sections import SAME_PLACE
 
 Integers = NDArray[np.int64]
 NO_HINGES: Floats = np.zeros((3, 3))
-ROUND_OFF = 1e-9  # of a length: points that are nearer are the same
 
 
 class Rows(NamedTuple):
@@ -287,7 +287,7 @@ def means_beside(s: Floats, nodes: Floats, values: Floats) -> Floats:
 def means_on_line(s: Floats, nodes: Floats, values: Floats) -> Floats:
     """The same (ns,) of one output (N+1,), whose points s (ns,) m may be the same where line is still on a reel."""
     points, which = np.unique(s, return_inverse=True)
-    apart = np.append(True, np.diff(points) > ROUND_OFF * (nodes[-1] - nodes[0]))
+    apart = np.append(True, np.diff(points) > SAME_PLACE * (nodes[-1] - nodes[0]))
     points, which = points[apart], (np.cumsum(apart) - 1)[which]
     if points.size == 1:
         return np.full(s.size, np.interp(points[0], nodes, values))

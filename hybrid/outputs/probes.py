@@ -42,7 +42,7 @@ from hybrid.kernels.watch.observed_outputs import (
 )
 from hybrid.kernels.watch.observed_outputs import WORK as SCRATCH
 from hybrid.model.mesh import Zone
-from hybrid.model.sections import NEAR, OutputPoints
+from hybrid.model.sections import SAME_PLACE, OutputPoints
 from hybrid.outputs.observation import (
     JoinedGrid,
     JoinedObservation,
@@ -496,7 +496,7 @@ class Observer:
         self._finest = features.finest
         self._hinges = features.hinges.copy()
         self._cuts, self._changes = tuple(sorted({*features.loads, *jumps})), tuple(features.changes)
-        near = NEAR * line.s[-1]
+        near = SAME_PLACE * line.s[-1]
         self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in features.loads))
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
@@ -558,7 +558,9 @@ class Observer:
     def _place(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats) -> None:
         self.line, self.sea, self.zones = line, sea, tuple(zones)
         self.s, jumps, (begin, end) = s, self.jumps, line.s[[0, -1]]
-        if s[-1] > end * (1.0 + NEAR) or s[0] < begin - NEAR * end:  # on the reel: the values of the fairlead
+        if (
+            s[-1] > end * (1.0 + SAME_PLACE) or s[0] < begin - SAME_PLACE * end
+        ):  # on the reel: the values of the fairlead
             s, jumps = np.clip(s, begin, end), np.clip(jumps, begin, end)
         self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded, hinges=self._hinges)
         self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded, self._hinges)

@@ -20,6 +20,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, co
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout, LineOnBase, Zone, on_other_parts
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, fastest, lengths_at, payout_of
+from hybrid.model.sections import SAME_PLACE
 from hybrid.outputs.observation import Observation, Output
 from hybrid.outputs.probes import Observer
 from hybrid.scene.ends import SOURCES
@@ -32,7 +33,6 @@ VARIES_TOO = ("bend_law", "tension_twist", "wake_law")  # likewise, of lines tha
 # What a checkpoint keeps of a reel.
 OF_CELLS = ("lack", "rate", "since", "span")
 OF_EARLIER_VERSIONS = 10, 12, 13, 15  # numbers of a reel in checkpoints of those
-ROUND_OFF = 1e-9  # of the length: places of nodes are no nearer to what they were meant to be
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
 
 
@@ -114,7 +114,7 @@ class PayingOut:
     def _checked(self, length: float) -> float:
         """A length, m, to which line is to be paid out; ValueError: longer or shorter than can be."""
         plan = self.plan
-        if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
+        if not plan.shortest <= length <= plan.longest * (1.0 + SAME_PLACE):
             between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
             text = f"the length that is out would be {length:.6g} m, expected between {between} (payout.longest)"
             raise ValueError(text)
@@ -258,7 +258,7 @@ class PayingOut:
         at, out = np.flatnonzero(self._changing_on(reel)), e.copy()
         size = np.linalg.norm(out[:, at], axis=2)
         more = h[:, at] * (1.0 + ck[:, at] * T[:, at]) / size
-        out[:, at] *= np.where(np.abs(more - 1.0) > ROUND_OFF, more, 1.0)[:, :, None]  # at its ends they fit
+        out[:, at] *= np.where(np.abs(more - 1.0) > SAME_PLACE, more, 1.0)[:, :, None]  # at its ends they fit
         return out
 
     def as_now(self, model: Model) -> Model:
@@ -393,7 +393,7 @@ class PayingOut:
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
             raise ValueError("a length that no winch gives")
         if (
-            not np.searchsorted(self.plan.nodes, self.plan.shortest - self.plan.layer[0] - ROUND_OFF * model.length)
+            not np.searchsorted(self.plan.nodes, self.plan.shortest - self.plan.layer[0] - SAME_PLACE * model.length)
             <= count
             < self.plan.nodes.size - 1
         ):
@@ -471,7 +471,7 @@ def length_asked(scene: LineScene, paying: PayingOut, length: Any, rate: Any, wh
     if length is None:
         return None, float(rate)
     plan = paying.plan
-    if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
+    if not plan.shortest <= length <= plan.longest * (1.0 + SAME_PLACE):
         between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
         raise ValueError(f"length = {length:.9g} m, expected between {between} ({where}.longest)")
     return float(length), float(rate)

@@ -40,7 +40,7 @@ from hybrid.model.nearby import Weakness
 from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.resolution import Resolution, first_resolution
-from hybrid.model.sections import OutputPoints
+from hybrid.model.sections import SAME_PLACE, OutputPoints
 from hybrid.scene.base import dotted
 from hybrid.scene.network import Network
 from hybrid.scene.read import as_scene, read_text, scene_text
@@ -54,7 +54,6 @@ from hybrid.zones.manager import UserCriterion
 
 FIRST_WORKS = 11  # works that were booked once
 FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these
-SAME_NODE = 1e-9  # of the length: round-off of the place of a node
 # What the tree of a line calls names of the old one, and what that of the run does.
 OF_LINE = {x: x for x in ("state", "rho", "work", "power", "envelope", "ends", "first_energy", "torsion")}
 OF_LINE |= {"_stored": "stored", "watch": "noted", "first_places": "first_places", "first_turns": "first_turns"}
@@ -137,7 +136,9 @@ def _check_mesh(saved: Any, model: Model) -> None:
     mesh = matched({"here": None} | dict(saved), dict.fromkeys({"here": None} | mine), "mesh")
 
     def same(a: Any, b: Floats) -> bool:
-        return isinstance(a, np.ndarray) and a.shape == b.shape and bool((abs(a - b) <= SAME_NODE * model.length).all())
+        return (
+            isinstance(a, np.ndarray) and a.shape == b.shape and bool((abs(a - b) <= SAME_PLACE * model.length).all())
+        )
 
     if "s" in mine:
         fits = same(mesh["s"], mine["s"]) and mesh["zones"] == mine["zones"]
@@ -341,7 +342,7 @@ MAY_CHANGE = (
     *(f"{what}.NAME.{key}" for what in ("points", "bodies") for key in ("motion", "force", "moment")),
 )
 # Of the length, and of the length in the time of a transverse wave: what an end may jump by, and its velocity.
-SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
+MOST_JUMP, MOST_KICK = 1e-6, 1e-3
 SAME_INTERVAL = 1e-9  # part of the interval of outputs: round-off
 
 
@@ -481,7 +482,7 @@ def _refuse_more_out(before: Any, after: Any, until: float) -> None:
     for name in before.lines:
         scene, longer = before.scene_of(name), after.scene_of(name)
         out = longest_out(longer)
-        if out > longest_out(scene) * (1.0 + SAME_PLACE):
+        if out > longest_out(scene) * (1.0 + MOST_JUMP):
             end = ("start", "end")[winch_side(scene)]
             where = dotted(before.form.place(("lines", name, "connections", end, "payout", "longest")))
             expected = f"a time up to which at most {longest_out(scene):.6g} m are out, for which the result has points"
@@ -573,8 +574,8 @@ def _refuse_jump(before: Model, after: Model, k: int, t: float, where: str) -> N
     held, length = bool(before.ends.values.held[k]), after.length
     one, other = (_place(model.ends, k, t) for model in (before, after))
     apart, faster, turned, spun = (float(np.linalg.norm(a - b)) for a, b in zip(one, other, strict=True))
-    jumps = held and (apart > SAME_PLACE * length or faster > SAME_SPEED * length / after.time_scale)
-    if jumps or turned > SAME_PLACE or spun > SAME_SPEED / after.time_scale:
+    jumps = held and (apart > MOST_JUMP * length or faster > MOST_KICK * length / after.time_scale)
+    if jumps or turned > MOST_JUMP or spun > MOST_KICK / after.time_scale:
         sizes = ((apart, "m"), (faster, "m/s"), (turned, "rad"), (spun, "rad/s"))
         by = ", ".join(f"{x:.3g} {unit}" for x, unit in sizes if x > 1e-9)
         fix = "times count from the start of the run: travel {by, over, begin} starts from rest where the end is"

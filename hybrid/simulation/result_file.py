@@ -41,7 +41,7 @@ from hybrid.kernels.state.report import (
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
 from hybrid.model.payout import whole_scene
-from hybrid.model.sections import NEAR, SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
+from hybrid.model.sections import SAME_PLACE, SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
 from hybrid.outputs.probes import Observer
 from hybrid.scene.attachments import Modules
 from hybrid.scene.quantities import Quantity
@@ -170,7 +170,7 @@ def _limits(scene: LineScene, observer: Observer) -> list[tuple[Field, np.ndarra
 
     At jumps that of the section on the left, and in right/* of the one on the right, as of what they are held against.
     """
-    beside = 3.0 * NEAR * scene.length
+    beside = 3.0 * SAME_PLACE * scene.length
     jumps = observer.jumps
     left = observer.s - beside * np.isin(observer.s, jumps)
     scene, begin = whole_scene(scene)
@@ -424,7 +424,7 @@ class Envelope:
         pipes = Pipes(scene) if any(x.pipe for x in scene.cable.sections) else None
         parts = _parts_of(scene, model, moves, touches) | ({"pipe"} if pipes is not None else set())
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in parts}
-        side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
+        side = 3.0 * SAME_PLACE * model.length  # beyond which a place is no longer at a change of section
         first, second = (np.flatnonzero(np.diff(self.s) == 0.0) + k for k in (0, 1))
         beside = self.s.copy()
         beside[first] -= side

@@ -38,7 +38,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_o
 from hybrid.model.build import Model, as_begun, planar
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import follows_curvature, wants_errors
-from hybrid.model.sections import OutputPoints, output_points, section_changes, wave_step
+from hybrid.model.sections import SAME_PLACE, OutputPoints, output_points, section_changes, wave_step
 from hybrid.outputs.observation import Observation, Output, outputs_in
 from hybrid.outputs.probes import Features, Observer, Recorded
 from hybrid.outputs.quantities import quantities_of
@@ -70,11 +70,7 @@ FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force
 # of so many numbers, 2 MB, which a processor keeps: with 64 of 100 cells a run takes 5 % more, with 256 3 %.
 WAITING, TOGETHER = 512, 250_000
 MOST_WAITING = 4_000_000  # numbers of those of all lines that wait, 32 MB: quantities of fewer outputs take as long
-# Nodes of outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
-MOST_ASIDE = 20_000
-FEWEST_JOINED = 4
-# Of the length: ends that are so near to where they were have not been moved.
-SAME_PLACE = 1e-9
+MOST_ASIDE = 20_000  # nodes of outputs that are put aside
 # Flags of a step (kernels.state.books), and bits of kernels.contact.self_distance.
 WATCHED = {MEETS_ITSELF: MEETS, NEARS_ITSELF: NEARS, PARTS_ITSELF: PARTS, HIDES_ITSELF: HIDES}
 # Turns of twist at rest, made by no moment, from which on it is said: searches by way of upright shapes have left 0.4.
@@ -326,7 +322,7 @@ class RunLine:
         # all that is written has to follow from the states
         line, of_states = self.model.line, not self.observer.writes_criteria and self.observer.quantities is None
         laws = line.law, line.bend_law, line.slip_law, line.torsion, line.tension_twist
-        return change and of_states and line.h.size >= FEWEST_JOINED and not any(x.size for x in laws)
+        return change and of_states and not any(x.size for x in laws)
 
     def use_model(self, model: Model, other_cells: bool = False) -> None:
         """Go on with another model, after what waits has been recorded.
