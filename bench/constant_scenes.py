@@ -37,6 +37,7 @@ class Asked(NamedTuple):
 
     function: str
     scene: Any
+    args: tuple[Any, ...]  # and these, of plain values
     more: dict[str, Any]
     file: bool  # whether a result was written
     test: str
@@ -100,18 +101,19 @@ def seen() -> Iterator[Read]:
 
 def _recording(name: str, compute: Callable[..., Any], kept: Callable[[Asked], None]) -> Callable[..., Any]:
     def wrapped(scene: Any, *args: Any, **more: Any) -> Any:
-        simple = all(isinstance(x, int | float | str | None) for x in more.values())
         file = name in ("run", "static") and bool(args or more.get("output"))
+        plain = () if file else args
+        simple = all(isinstance(x, int | float | str | list | tuple | None) for x in (*plain, *more.values()))
         begin, cwd = clock.process_time(), Path.cwd()
         with seen() as read:
             try:
                 return compute(scene, *args, **more)
             finally:
                 cpu = clock.process_time() - begin
-                if simple and (file or not args) and cpu < LONGEST and cwd == Path.cwd():
+                if simple and cpu < LONGEST and cwd == Path.cwd():
                     more = {k: x for k, x in more.items() if k not in ("output", "progress", "overwrite")}
                     test = os.environ.get("PYTEST_CURRENT_TEST", "").split(" (")[0]
-                    kept(Asked(name, scene, more, file, test, cpu, read))
+                    kept(Asked(name, scene, plain, more, file, test, cpu, read))
 
     return wrapped
 
@@ -139,7 +141,7 @@ def recorded(folder: Path) -> list[Asked]:
         with path.open("rb") as file, contextlib.suppress(EOFError):
             while True:
                 x = pickle.load(file)
-                key = (x.function, repr(x.scene), repr(x.more), x.file)
+                key = (x.function, repr(x.scene), repr(x.args), repr(x.more), x.file)
                 if "pytest-of-" in repr(x.scene):  # a file that is gone
                     continue
                 if key not in found or x.cpu < found[key].cpu:
@@ -156,7 +158,7 @@ def again(asked: Asked, folder: Path) -> Facts:
     if asked.file:
         more |= {"output": folder / "again.h5", "overwrite": True}
     try:
-        result = getattr(hybrid, asked.function)(asked.scene, **more)
+        result = getattr(hybrid, asked.function)(asked.scene, *asked.args, **more)
     except HybridError as error:
         return Facts(str(error), {}, [])
     if isinstance(result, hybrid.Result):

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import ast
 import faulthandler
+import importlib
 import json
 import math
 import os
@@ -91,12 +92,12 @@ class StoppedError(BaseException):
 
 
 def constants() -> list[Constant]:
-    """Numbers with a name in the rooms, as they are when the package is loaded; counters and codes too."""
+    """Numbers with a name in the rooms; counters and codes too."""
     found = []
-    for name, module in sorted(sys.modules.items()):
-        if not name.startswith("hybrid.") or name.split(".")[1] not in ROOMS or not module.__file__:
-            continue
-        for node in ast.parse(Path(module.__file__).read_text(encoding="utf-8")).body:
+    for path in (x for room in ROOMS for x in sorted((ROOT / "hybrid" / room).glob("*.py"))):
+        name = f"hybrid.{path.parent.name}.{path.stem}".removesuffix(".__init__")
+        module = importlib.import_module(name)
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
             targets = node.targets if isinstance(node, ast.Assign) else []
             for target in targets:
                 for x in target.elts if isinstance(target, ast.Tuple) else [target]:
@@ -145,7 +146,7 @@ def own_scenes() -> Iterator[Asked]:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
         scenes.append(("run", f"{path.stem}, 5 %", changed(data, free | {"accuracy": "5%"})))
     for function, name, data in scenes:
-        asked = Asked(function, data, {}, False, name, 0.0, set())
+        asked = Asked(function, data, (), {}, False, name, 0.0, set())
         again(asked, Path())  # compiles
         begin = clock.process_time()
         with seen() as read:
