@@ -1,6 +1,6 @@
 """Scenes that tests compute, and what they come to: the corpus in which each constant is tried.
 
-As a plugin of pytest it writes down what tests ask of the package, with the names of constants that are read on the way (each line once):
+As a plugin of pytest it writes down what tests ask of the package, and which constants lines read that are run:
 
     HYBRID_RECORD=folder pytest -p constant_scenes tests/simulation
 """

@@ -54,6 +54,13 @@ FOLDERS = (
     "designs",
     "zones",
     "scene",
+    "statistics",
+    "store",
+    "exports",
+    "interop",
+    "studies",
+    "couple",
+    "view",
 )
 SAME = 1e-12  # of the root mean square
 TOO_LONG = 20.0  # times the usual time, beyond which a computation is stopped
@@ -282,12 +289,13 @@ def _row(constant: Constant, tried: int) -> dict[str, Any]:
 def test_what_constants_move(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(EXAMPLES)  # files that scenes name
     faulthandler.cancel_dump_traceback_later()  # no other test takes so long
-    write, nothing = os.environ.get("HYBRID_BENCH_WRITE"), 0
+    write, nothing, scenes = os.environ.get("HYBRID_BENCH_WRITE"), 0, 0
     for found in Trials(tmp_path):
-        nothing += not found["what"]
+        nothing, scenes = nothing + (not found["what"]), max(scenes, found["tried"])
         what = f"{found['test']}: {found['what']}" if found["what"] else f"nothing in {found['tried']} scenes"
         print(f"{found['module'].removeprefix('hybrid.')}.{found['name']} = {found['value']:g}: {what}", flush=True)
         if write:
             with Path(write).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(found) + "\n")
     print(f"nothing moves with {nothing}")
+    assert scenes  # else nothing was recorded, or what was asked for is read nowhere

@@ -558,9 +558,8 @@ class Observer:
     def _place(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats) -> None:
         self.line, self.sea, self.zones = line, sea, tuple(zones)
         self.s, jumps, (begin, end) = s, self.jumps, line.s[[0, -1]]
-        if (
-            s[-1] > end * (1.0 + SAME_PLACE) or s[0] < begin - SAME_PLACE * end
-        ):  # on the reel: the values of the fairlead
+        # on the reel: the values of the fairlead
+        if s[-1] > end * (1.0 + SAME_PLACE) or s[0] < begin - SAME_PLACE * end:
             s, jumps = np.clip(s, begin, end), np.clip(jumps, begin, end)
         self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded, hinges=self._hinges)
         self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded, self._hinges)

@@ -288,7 +288,7 @@ def _hidden_at(model: Model, seen: Observation, node: int, EI: Floats) -> Sectio
     true_moment = (EI[0] * fades[1] + EI[1] * fades[0]) / (fades[0] + fades[1])  # for kappa0 = 1/m
     beside = node + (2 if after else -2)
     beside = beside if 0 < beside < line.h.size else node + (1 if after else -1)
-    kappa = np.linalg.norm(d[1:] - d[:-1], axis=1) / line.hn[1:-1, None]  # of the nodes inside
+    kappa = np.linalg.norm(d[1:] - d[:-1], axis=1) / seen.of_line("hn", slice(1, -1))  # of the nodes inside
     true = kappa[beside - 1] * true_moment / EI.min()
     side = int(np.flatnonzero(seen.grid.side_nodes == node)[-1 if after else 0])
     shown = seen.curvature_on_sides[side]
@@ -297,7 +297,7 @@ def _hidden_at(model: Model, seen: Observation, node: int, EI: Floats) -> Sectio
     hidden = (true > MORE * shown) & (true * fades.min(axis=0) > ASKEW) & (true > SMALL * kappa.max(axis=0))
     hidden &= (seen.T[node] > 0.0) & (fades.min(axis=0) < 0.1 * length)
     if may_show:
-        hidden &= line.h[cell] > LONG * fades.min(axis=0)
+        hidden &= seen.of_line("h", cell) > LONG * fades.min(axis=0)
     at = np.flatnonzero(hidden)
     if not at.size:
         return None

@@ -136,9 +136,8 @@ def _check_mesh(saved: Any, model: Model) -> None:
     mesh = matched({"here": None} | dict(saved), dict.fromkeys({"here": None} | mine), "mesh")
 
     def same(a: Any, b: Floats) -> bool:
-        return (
-            isinstance(a, np.ndarray) and a.shape == b.shape and bool((abs(a - b) <= SAME_PLACE * model.length).all())
-        )
+        fits = isinstance(a, np.ndarray) and a.shape == b.shape
+        return fits and bool((abs(a - b) <= SAME_PLACE * model.length).all())
 
     if "s" in mine:
         fits = same(mesh["s"], mine["s"]) and mesh["zones"] == mine["zones"]
