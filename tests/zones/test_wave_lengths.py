@@ -119,6 +119,16 @@ def test_a_line_at_rest_or_nearly_so_has_base_cells() -> None:
     assert planned(lambda s: 1e-3 * hump(s)).size > 20
 
 
+@pytest.mark.parametrize("size", [4.0, 1.0, 0.25])
+def test_velocities_below_a_twentieth_of_the_tolerance_in_a_ramp_time_count_as_that(size: float) -> None:
+    """Cells are as long as for faster waves of that form down to there, and longer below as velocities bend less."""
+    clock = watched(hump).manager.zones.clock
+    slowest = 0.05 * clock.tolerance / clock.ramp_time / np.ptp(hump(np.linspace(0.0, 10.0, 1001)))
+    fast, slow = (watched(lambda s, x=x: x * hump(s)) for x in (1.0, size * slowest))
+    squares = [after(x.manager, x.table, 50.0)[1:-1].min() for x in (fast, slow)]
+    assert squares[1] / squares[0] == pytest.approx(max(1.0 / size, 1.0), rel=0.01)
+
+
 @pytest.mark.parametrize("cells", [30, 60, 120, 400])
 def test_layer_behind_a_hinge(cells: int) -> None:
     """A heavy taut line with even cells: between its pinned end and the next node curvature is off by the part of that
