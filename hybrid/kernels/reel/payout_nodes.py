@@ -616,6 +616,7 @@ class LineJob(NamedTuple):
     out: Line
     reel: Reel  # of `out`
     nodes: Floats  # (M,) m
+    since: Floats  # s, from when on cells of `line` get what they lack, as of its reel
 
 
 blank_line_job = blanks(LineJob)
@@ -624,10 +625,14 @@ read_line = reader(blank_line_job())
 
 @kernel
 def make_line(table):
-    """`line_as`, and its reel."""
+    """`line_as`, and its reel; cells that lack something in `line` alone have their true lengths."""
     job = read_line(table)
-    place_reel(job.reel, job.nodes, job.out.h.shape[0] - job.reel.layer.shape[0] + 1)
-    line_as(job.line, job.out, job.reel, job.nodes)
+    out, reel = job.out, job.reel
+    place_reel(reel, job.nodes, out.h.shape[0] - reel.layer.shape[0] + 1)
+    line_as(job.line, out, reel, job.nodes)
+    for k in range(min(job.since.shape[0], out.h.shape[0])):
+        if job.since[k] > -np.inf:
+            out.h[cell(out, reel, k)] = reel.true[k]
 
 
 # --- the planner ----------------------------------------------------------------------------------
