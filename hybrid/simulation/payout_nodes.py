@@ -190,8 +190,7 @@ class NodeChanges(Remesh):
         line = lines_like(model.line)(cells, **of_whole_line(model.line))
         reel = self._reel(1 - k, cells)
         reel.numbers[:] = paying.reel.numbers
-        given = {"nodes": paying.plan.nodes, "since": paying.reel.since}
-        self._line_table.bind(line=model.line, out=line, reel=reel, **given)
+        self._line_table.bind(line=model.line, out=line, reel=reel, nodes=paying.plan.nodes, since=paying.reel.since)
         make_line(self._line_table.numbers)
         reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = self._lacks[begin:end].reshape(OF_REEL, cells)
         return paying.outputs_in(line, reel, batch), end
