@@ -264,8 +264,7 @@ class Estimate:
     def differs_in_zones(self, result: RunSample) -> bool:
         """Whether a finer result has other zones than this one by more than OTHER_ZONES of its catenaries or rods."""
         before, after = self.run.catenary, result.catenary
-        most = OTHER_ZONES * np.minimum(before, 1.0 - before)
-        return before.size == after.size and bool((np.abs(before - after) > most).any())
+        return before.size == after.size and _are_others(before, after)
 
     def lacks_model_errors(self) -> bool:
         """Whether the model error is not known, or of a run whose zones have moved otherwise, or of much longer cells.
@@ -279,8 +278,7 @@ class Estimate:
             return False
         if self.run.cells > LEAST_RATIO * COARSER * cells or not then.size:
             return True
-        here = now[every_of(now.size, every)]
-        return bool((np.abs(here - then) > OTHER_ZONES * np.minimum(here, 1.0 - here)).any())
+        return _are_others(now[every_of(now.size, every)], then)
 
     def update(self, result: RunSample) -> None:
         """A finer run has become the result."""
@@ -577,6 +575,11 @@ class Estimate:
 
 # Steps are counted over so many usual steps of the slower run, before and after each of so many times.
 AROUND, TIMES = 2.0, 200
+
+
+def _are_others(before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether parts of the line that are catenaries differ at an output by more than OTHER_ZONES of them or of rods."""
+    return bool((np.abs(before - after) > OTHER_ZONES * np.minimum(before, 1.0 - before)).any())
 
 
 def usual_ratio(fast: RunSample, slow: RunSample) -> float:

@@ -52,8 +52,6 @@ FEWEST_PIECES = 8  # at least
 MOST_PERIODS = 200  # modes with more are left out: a ramp that is so long leaves nothing
 # Times at which amplitudes are followed as they die; rate of that, of the velocity of a harmonic and its drag.
 DYING, HARMONIC = 60, 4.0 / (3.0 * pi)
-# Frequencies of a motion and of a vibration count as different by at least so many rad in the duration.
-CLOSE = 1.0
 # An error by steps that this makes is worth a word where it exceeds what is asked, and the error figure so many times;
 # where nothing is asked, this part of the largest value.
 TIMES_THE_FIGURE, PART = 1.5, 0.01
@@ -324,8 +322,11 @@ class Vibrations:
 
 
 def _harmonic_until(quiet: float, o: float, w: Floats, unit: Floats, duration: float) -> Floats:
-    """Integral until `quiet` (s) of  u'' exp(-i w t)  for  u = Re(unit exp(-i o t))  that has grown slowly, (m,)."""
-    near = np.where(o < w, -1.0, 1.0) * np.maximum(np.abs(o - w), CLOSE / duration)
+    """Integral until `quiet` (s) of  u'' exp(-i w t)  for  u = Re(unit exp(-i o t))  that has grown slowly, (m,).
+
+    At resonance it is no larger than over the duration, s: frequencies count as 1 rad of that apart.
+    """
+    near = np.where(o < w, -1.0, 1.0) * np.maximum(np.abs(o - w), 1.0 / duration)
     up = unit.conj() * np.exp(1j * near * quiet) / (1j * near)
     down = unit * np.exp(-1j * (o + w) * quiet) / (-1j * (o + w))
     return np.asarray(-o * o / 2.0 * (up + down))

@@ -25,6 +25,7 @@ import numpy as np
 from hybrid.accuracy.error_order import joined, magnitude
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.model.build import Model
+from hybrid.model.material import LEAST_WEIGHT
 from hybrid.model.mesh import GROWTH, Grading
 from hybrid.model.network import NetworkResolution, build_network
 from hybrid.model.payout import payout_of
@@ -328,9 +329,6 @@ def _placed_as(resolution: NetworkResolution, coarse: NetworkResolution, names: 
 
 CHOSEN = "slack line as rods"  # of the event that says so
 RODS = 100  # of a mesh that is not given
-# Of the weight in vacuum at the earth's surface: what a line that floats, or has no weight, counts as having.
-LEAST_WEIGHT = 1e-2
-GRAVITY = 9.81  # m/s2
 
 
 class Instead(NamedTuple):
@@ -362,7 +360,7 @@ def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tupl
     for x in sections:
         if not x.weakest_bending:
             in_water = around.gravity * (x.mass - density * 0.25 * math.pi * (x.diameter or 0.0) ** 2)
-            given.append(max(abs(in_water), LEAST_WEIGHT * GRAVITY * x.mass) * length**3)
+            given.append(max(abs(in_water), LEAST_WEIGHT * x.mass) * length**3)
             x = x.model_copy(update={"bending_stiffness": given[-1]})
         found.append(x)
     return tuple(found), given

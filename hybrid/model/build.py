@@ -24,7 +24,7 @@ from hybrid.model.contents import Entry, contact_bits, contents_of
 from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import corners, first_state, from_joint, hung, other_state, spare_shapes
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on
-from hybrid.model.material import STIFFENER_CELLS, Material
+from hybrid.model.material import LEAST_WEIGHT, STIFFENER_CELLS, Material
 from hybrid.model.mesh import (
     DEFAULT_CELLS,
     Layout,
@@ -415,7 +415,6 @@ def _at_places(
     return divided(np.interp(resolution.places, np.arange(len(knots)), knots), resolution.parts), zones
 
 
-LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
 # Twist, rad, that a cell takes of what the ends prescribe, at fineness 1: runs to compare with have cells four times as
 # long, and must stay below the twist at which a run stops (simulation.diagnostics).  Beyond so many cells it is left
 # to that: it is more likely that a stiffness is in another unit.
@@ -555,7 +554,7 @@ def _following_parts(scene: LineScene, cable: Material, base: Floats, resolution
     """Finest cells (n,) of base cells between nodes (n+1,) m, where they follow the curvature."""
     assert isinstance(scene.model, AdaptiveModel)
     middle = 0.5 * (base[:-1] + base[1:])
-    bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(middle)]
+    bend = cable.bending_length(LEAST_WEIGHT * cable.mass)[cable.piece(middle)]
     twisted = TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length)
     share = scene.model.curvature_error
     assert share is not None

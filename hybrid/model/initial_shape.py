@@ -18,7 +18,7 @@ from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
 from hybrid.model.material import Material, nodes_at
 from hybrid.model.sea import Surroundings
-from hybrid.model.sections import net_weight
+from hybrid.model.sections import SAME_PLACE, net_weight
 from hybrid.scene.analysis import Equilibrium, Points, RodZone, Straight, ZonesModel
 from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion import EndMotion
@@ -27,7 +27,6 @@ from hybrid.scene.sea import Seabed
 
 # A line that is longer than taut by less than this part of its length is not called slack.
 HARDLY = 1e-3
-SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
 GIVEN = "the polyline given"  # name of a first shape that the scene gives
 WAYS_OUT = 100  # places to which a node that is in an obstacle may be moved
@@ -75,7 +74,7 @@ def spare_shapes(scene: LineScene, s: Floats) -> Iterator[tuple[str, Floats]]:
     if start and end:
         first, span = np.array(start, float), np.subtract(end, start)
         yield "an arc", _arc(first, np.array(end, float), s, -1.0 if net_weight(scene) >= 0.0 else 1.0)
-        if float(np.linalg.norm(span)) > SHORTEST_SPAN * scene.length:
+        if float(np.linalg.norm(span)) > SAME_PLACE * scene.length:
             yield "the straight span", first + (s / s[-1])[:, None] * span
 
 

@@ -52,6 +52,8 @@ STIFFENER_CELLS = 20
 LOCKED = 100.0  # bending stiffness of a restrictor that is locked, over that of the cable
 # Of its height, from which on the added mass of a body without mass counts in full.
 LEAST_DRAUGHT = 0.05
+# Weight over mass, N/kg, of a cable that floats or has no weight: a thousandth of what it has on land.
+LEAST_WEIGHT = 9.81e-3
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 OF_SECTIONS = ("mass", "ck", "rotary", "polar")  # per length, whatever else a scene asks for
 POINT = tuple(name for name in OF_POINTS if name not in ("point_lift", "footing"))

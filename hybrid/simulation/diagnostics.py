@@ -59,7 +59,7 @@ from hybrid.simulation.events import (
 )
 from hybrid.simulation.mesh_survey import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.watches import (
-    PRESSED,
+    NEWTON_LEAVES,
     Knot,
     Loops,
     SchemeWatch,
@@ -94,13 +94,11 @@ COMPRESSED = 1e-4
 LAYER = 0.5
 # A jump of tension within a step, as a part of the largest that anything in the scene can ask for.
 SNAP = 3.0
-# A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.
-TURNED = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
 NEVER = 1e300  # s, when nothing was noted
 # What a checkpoint holds of it as plain values.
 REMEMBERED: tuple[str, ...] = ("_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off")
-REMEMBERED += ("_left_out", "_jump", "_loop", "_writhe", "_writhes", "_section", "_kink", "_weight", "_lay")
+REMEMBERED += ("_jump", "_loop", "_writhe", "_writhes", "_section", "_kink", "_weight", "_lay")
 REMEMBERED += ("_knot", "_bent", "_negative", "_noted_bends")
 
 
@@ -127,7 +125,7 @@ class Diagnostics:
         # s, when a bend was noted first at the start, the end and point loads: outputs are looked at after later steps
         self._noted_bends: Floats = np.full(2 + len(model.attached), NEVER)
         self._off = OFF * model.length
-        self._left_out = self._section = self._weight = False
+        self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
         self.of_scheme = SchemeWatch(model, events)
         self._kink, self._negative = KINK, NEGATIVE
@@ -365,16 +363,6 @@ class Diagnostics:
         self.of_scheme.finish()
         self.of_scheme.note_coarse_steps(self._model.length, books)
 
-    def torque(self, t: float, turn: float, torque: float) -> None:
-        """A torque that zones which move do not carry, because a catenary lies between the ends."""
-        if abs(turn) > TURNED and not self._left_out:
-            text = (
-                f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: "
-                f"the result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
-            )
-            self.events.event(t, 0.0, self._model.length, "torque neglected", text)
-            self._left_out = True
-
     def stretch(self, state: State) -> Stop:
         """A section that is stretched or compressed beyond what it bears."""
         if self._model.inextensible:
@@ -449,9 +437,7 @@ class Diagnostics:
         if line.bits & SEABED:
             found |= np.maximum.reduceat(seen.depth[:, 0], begin) - 0.5 * seen.sea.onset > self._sunk
         if not self.of_scheme.rested and line.spin.any():
-            stiff = np.where(line.element == 1, line.kb[:, :2].min(axis=1) * line.hn, np.inf)
-            least = PRESSED * np.minimum.reduceat(stiff, begin) / model.length
-            least[np.isinf(least)] = 0.0
+            least = NEWTON_LEAVES * model.tension_scale * model.length
             tension = np.where(line.spin == 1, seen.T[:, 0], np.inf)
             tension[seen.begin[1:-1] - 1] = np.inf  # of no line
             found |= np.minimum.reduceat(tension, begin) * model.length < -least

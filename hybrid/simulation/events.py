@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.seabed import planes_under
 from hybrid.kernels.state.state import Floats, Line, State
-from hybrid.model.build import LEAST_WEIGHT, Model
+from hybrid.model.build import Model
 from hybrid.model.initial_shape import dead_loads, end_laid_anywhere
-from hybrid.model.material import Material
+from hybrid.model.material import LEAST_WEIGHT, Material
 from hybrid.outputs.observation import Observation
 from hybrid.scene.schema import LineScene
 from hybrid.solve.stability import lies_slack
@@ -81,7 +81,7 @@ def too_long_for_weight(cable: Material, line: Line) -> tuple[np.ndarray, Floats
     rod = (line.spin[:-1] == 1) & (line.spin[1:] == 1) & (line.element[1:-1] == 1)
     between = np.flatnonzero(rod & (line.h[:-1] > 0.0) & (line.h[1:] > 0.0))
     piece = cable.piece(0.5 * (line.s[:-1] + line.s[1:]))
-    length = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[piece]
+    length = cable.bending_length(LEAST_WEIGHT * cable.mass)[piece]
     EI = cable.weakest_bending[piece]
     l = np.minimum(length[between], length[between + 1])
     longer = (np.maximum(line.h[between], line.h[between + 1]) > l) & (l > 0.0)

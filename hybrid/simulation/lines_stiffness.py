@@ -36,12 +36,10 @@ from hybrid.solve.stepper import NetworkState
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
 # Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
-# touch themselves or bodies, of the narrowest diameter, over a part of which contact stiffens, but no less than a part
-# of that.
+# touch themselves or bodies, of the narrowest diameter, over a part of which contact stiffens, where that is less.
 SMALL_SHIFT = 2e-5  # of the longest line
 SMALL_TURN = 2e-4  # rad
 OF_DIAMETER = 1e-3  # of the narrowest diameter
-LEAST_PART = 0.05  # of SMALL_SHIFT and SMALL_TURN
 # Springs that hold a body while a force acts on it resist as it does itself, and at least as this part of the stiffest.
 LEAST_SPRING = 1e-3
 
@@ -157,7 +155,7 @@ def _stiffness(solver: NetworkSolver, state: NetworkState, first: int, size: int
             springs = np.maximum(springs, solver.scale / solver.length * np.repeat([1.0, solver.arm**2], 3))
         for some in (slice(0, 3), slice(3, 6)):  # in axes of the body
             mass[some, some] += R.T @ np.diag(springs[some] / solver.anchor) @ R
-    near = max(min(OF_DIAMETER * _narrowest(solver) / (SMALL_SHIFT * solver.length), 1.0), LEAST_PART)
+    near = min(OF_DIAMETER * _narrowest(solver) / (SMALL_SHIFT * solver.length), 1.0)
     for k in range(size):
         small = near * (SMALL_SHIFT * solver.length if k < 3 else SMALL_TURN)
         part, moved = small * (abs(float(K[k, k])) + springs[k]), []

@@ -33,8 +33,6 @@ from hybrid.solve.stepper import JoinedLine, NetworkState
 from hybrid.store.envelope import meeting_text
 
 Pair = tuple[int, int]
-# Diameters by which ways from a joint to where lines that lie along each other meet differ at most.
-ALONG = 2.0
 # Where lines are that are said to be within themselves.
 WITHOUT_CONTACT, AT_START = "in the equilibrium without contact", "at the start"
 # Kinds of events: contact between lines begins by itself; it is given up because no step leads on with it.
@@ -455,7 +453,8 @@ def _side_by_side(
 ) -> bool:
     """Whether two lines that met at these arc lengths (m) lay along each other all the way from a common joint.
 
-    They did where both places are as far from it along the lines, and one of the lines is straight up to there.
+    They did where both places are as far from it along the lines, and one of the lines is straight up to there, both
+    to a diameter.
     """
     (a, c), (s, other) = pair, where
     width = max(float(diameters(model.models[k]).max()) for k in pair)
@@ -466,7 +465,7 @@ def _side_by_side(
             place = [np.interp(at, nodes, r[:, j]) for j in range(3)]
             ways.append(abs(at - float(nodes[tip])))
             bows.append(ways[-1] - float(np.linalg.norm(place - r[tip])))
-        if abs(ways[0] - ways[1]) < ALONG * width and min(bows) < width:
+        if max(abs(ways[0] - ways[1]), min(bows)) < width:
             return True
     return False
 

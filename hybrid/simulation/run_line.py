@@ -437,9 +437,6 @@ class RunLine:
         """Record states."""
         if self.shown is not None:
             self.shown(batch)
-        if self.manager is not None and not self.model.line.torsion.size:
-            clock, t = self.manager.zones.clock, float(batch.t[-1])
-            self.diagnostics.torque(t, clock.torque * clock.compliance, clock.torque)
         if self._sampled:
             self._aside += [(self.model, x) for x in self._sampled]
             self._sampled = ()

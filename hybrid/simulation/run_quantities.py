@@ -40,8 +40,6 @@ from hybrid.solve.network_solver import NetworkSolver
 from hybrid.store.format import Field
 from hybrid.store.hdf5_file import group_of
 
-MORE_CELLS = 4  # times as many as at first may a line have whose chords are looked at; with more nothing is known
-
 
 def idle_ends(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
     """Ends (line, 0 or 1) that are alone at a free point on which nothing acts, or have come loose."""
@@ -84,7 +82,7 @@ class RunQuantities(Part):
             keeper[name] = q.line or ""
             if q.other is not None:
                 first[name], keeper[name] = sorted([str(q.line), q.other], key=order.index)
-                most = MORE_CELLS * lines[order.index(first[name])].model.line.h.size + 2
+                most = lines[order.index(first[name])].model.most_cells + 2
                 rows_of[name], rows = (rows, rows + most), rows + most
         paths = [np.zeros((rows, PATH_ROW))]
         for line in (x for x in lines if x.name in self._scenes):

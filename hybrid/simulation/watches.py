@@ -161,15 +161,9 @@ FIRST_MOMENTS = 0.1
 NEWTON_LEAVES = 1e-7
 # Numerical dissipation, as a part of the same energy: beyond this the step was too long for the motion.
 LOSS_NOTED = 0.5
-# A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
-# under, and what Newton leaves of no tension at all is far below.
-PRESSED = 1e-3
-# A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
-AT_REST = 1e-4
-# More bending than this part of the elastic energy is no symmetry that something could break.
-BENT = 1e-3
-# Inertia above this part of the load is a motion that has begun.
-LET_GO = 0.01
+# Kinetic energy above this part of the elastic one, or inertia above this part of the load, is a motion that has begun;
+# bending energy above it is no symmetry that something could break.
+BEGUN = 0.01
 # What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
 # (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
 COARSE = 0.35
@@ -279,17 +273,15 @@ class SchemeWatch:
         if self._rested or not rod.any():
             return
         elastic = sum(values[f"energy/{x}"] for x in ("stretch", "bending", "torsion"))
-        kb = (batch.kb if batch.kb.size else line.kb[None])[:, line.element == 1, :2]
-        bending = (kb * line.hn[line.element == 1, None]).min(axis=(1, 2), initial=np.inf)
-        least = np.where(np.isfinite(bending), PRESSED * bending / model.length, 0.0)  # J
+        least = NEWTON_LEAVES * model.tension_scale * model.length  # J
         twisted, lowest_ = values["energy/torsion"] > least, batch.T[:, rod].min(axis=1)
         pressed = (lowest_ * model.length < -least) | twisted
-        calm = (values["energy/kinetic"] <= AT_REST * elastic) | ~batch.v.any(axis=(1, 2))
+        calm = (values["energy/kinetic"] <= BEGUN * elastic) | ~batch.v.any(axis=(1, 2))
         # what is let go has no velocity yet, but is no longer at rest
-        calm &= twisted | (float(line.mass.sum()) * np.abs(batch.vd).max(axis=(1, 2)) <= LET_GO * -lowest_)
+        calm &= twisted | (float(line.mass.sum()) * np.abs(batch.vd).max(axis=(1, 2)) <= BEGUN * -lowest_)
         # a line that is bent and whose ends move follows them, and snaps where it must; contact is not judged
         moves = np.abs(batch.v[:, [0, -1]]).max(axis=(1, 2)) > 0.0
-        calm &= ~(moves & (values["energy/bending"] > BENT * elastic))
+        calm &= ~(moves & (values["energy/bending"] > BEGUN * elastic))
         if "energy/self_contact" in values:
             calm &= values["energy/self_contact"] == 0.0
         for k in np.flatnonzero(pressed & calm):
@@ -298,7 +290,7 @@ class SchemeWatch:
                 text = "the rod rests where it would buckle: only its perfect symmetry keeps it there"
                 text += "; give it a small bow"
                 # a bent one may be on its way, and has no symmetry that is known
-                if values["energy/bending"][int(k)] > least[min(int(k), least.size - 1)]:
+                if values["energy/bending"][int(k)] > least:
                     text = "the rod is almost at rest in a shape that is not stable (its stiffness against some "
                     text += "displacement is negative): it is leaving it, or nothing in the scene disturbs it there"
                 s = float(line.s[np.argmin(state.T)])

@@ -348,3 +348,17 @@ def test_what_is_judged_survives_a_stop(tmp_path, monkeypatch):
     stops = [heard // 3, heard // 6, heard - 60 - heard // 3 - heard // 6]
     assert went_on(scene, tmp_path / "parts.h5", stopping, stops) == 3
     assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+
+
+def test_a_run_of_an_irregular_motion_is_twice_as_fine_at_most():
+    """However far it misses: where cells and steps make the error now, chance does soon."""
+    fineness, steps = [], []
+
+    def sample(resolution: Resolution) -> RunSample:
+        fineness.append(resolution.fineness)
+        steps.append(resolution.step)
+        return as_run(noisy(1e3 * (1.0 + 0.5 / resolution.fineness**2)), resolution)
+
+    judged(sample, 1e-4)
+    assert max(fineness) == pytest.approx(2.0 * FINENESS.fineness)
+    assert min(steps) >= 0.5 * FINENESS.step

@@ -326,6 +326,15 @@ def test_crossings_are_those_of_the_table_of_knots(curve: Floats, expected: int)
     assert crossings_of_knot(line[::-1] @ turn) == expected
 
 
+@pytest.mark.parametrize("away", [(-0.3, -0.2, 0.5), (0.3, 0.4, 0.7), (0.0, 0.0, 0.6)])
+def test_a_knot_is_one_where_an_end_goes_back_into_its_middle(away: tuple[float, ...]) -> None:
+    """The end goes straight on from there, away from the middle: far enough that it is not left within the knot."""
+    t = np.linspace(-2.05, 2.05, 60)
+    knot = np.column_stack([t**3 - 3 * t, -(t**4 - 4 * t**2), (t**5 - 10 * t) / 20])
+    pulled = knot[-1] + 30.0 * (knot[-1] - knot[-2])
+    assert crossings_of_knot(np.vstack([knot, pulled, knot.mean(axis=0) + away])) == 3
+
+
 def drawn(size: float) -> tuple[Floats, Floats]:
     """Arc lengths (n,) and nodes (n, 3), m, of a line of 10 m with a trefoil in its middle, `size` times as large."""
     t = np.linspace(-2.05, 2.05, 60)
