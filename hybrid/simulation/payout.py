@@ -150,8 +150,11 @@ class PayingOut:
 
     @property
     def solves_twice(self) -> bool:
-        """Whether a winch holds a tension at the start, or at a clamp: an iteration takes another right-hand side."""
-        return self.holds_tension and (not self.plan.side or self.rides > 0)
+        """Whether a winch holds a tension at the start, or at a clamp, until it is stopped.
+
+        An iteration takes another right-hand side: there is room for that as long as the line runs.
+        """
+        return bool(self.plan.winch.tension) and (not self.plan.side or self.rides > 0)
 
     @property
     def damped(self) -> bool:

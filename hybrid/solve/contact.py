@@ -438,13 +438,15 @@ class SharedContact(ContactBooks):
         latest = int(self._times[1] == t)
         more = {name: x[latest].copy() for name, x in (("pushes", self._pushes), ("shares", self._shares))}
         more |= {"meetings": self.meetings.copy(), "starts": self.starts.copy(), "lows": self._lows.copy()}
+        more |= {"h": self.line.h.copy()}
         return super().checkpoint(t) | more
 
     def restore(self, saved: Mapping[str, Any], t: float = np.nan, remeshed: bool = False) -> None:
         """Go on from `checkpoint` at t, s; remeshed: of lines that had other cells.  ValueError: that cannot be."""
         mine = {"shares": self._shares[0], "meetings": self.meetings}
         mine |= {name: x for name, x in (("starts", self.starts), ("lows", self._lows)) if name in saved}
-        mine |= {} if remeshed else {"pushes": self._pushes[0]}  # else found with the state on its cells of now
+        if not remeshed:  # else found with the state on its cells of now
+            mine |= {"pushes": self._pushes[0]} | ({"h": self.line.h} if "h" in saved else {})
         for name, x in mine.items():
             if saved[name].shape != x.shape:
                 raise ValueError(f"contact/{name}: of other lines")

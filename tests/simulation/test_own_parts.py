@@ -105,6 +105,20 @@ def test_it_goes_on_from_a_checkpoint_to_the_bit(
     assert not (apart := differences(tmp_path / "whole.h5", tmp_path / "part.h5")), apart
 
 
+@pytest.mark.parametrize("clamp", [{}, {"kind": "clamped", "tangent": [0, 0, -1]}], ids=["pinned", "clamped"])
+def test_a_winch_that_holds_a_tension_at_the_start_stops(clamp: dict[str, Any], tmp_path: Path) -> None:
+    """Nodes that leave after that find no room for another right-hand side, which is asked for no more."""
+    scene = hanging(WINCH, time={"duration": 8, "step": 0.02})
+    scene["ends"] = {"start": scene["ends"]["end"] | clamp, "end": {"kind": "free"}}
+    whole = hybrid.run(scene, tmp_path / "whole.h5", parts=[Guard(410.0)])
+    (event,) = of_kind(whole, "part guard")
+    assert event.t < 5.0 and np.ptp(out(whole)) > 2.0 and np.ptp(out(whole)[whole.times > event.t + OVER]) < 1e-12
+    hybrid.run(scene | {"time": {"duration": 6, "step": 0.02}}, tmp_path / "part.h5", parts=[Guard(410.0)]).close()
+    hybrid.resume(tmp_path / "part.h5", until=8.0, parts=[Guard(410.0)]).close()
+    apart = differences(tmp_path / "whole.h5", tmp_path / "part.h5")
+    assert not [x for x in apart if not x.endswith(": scene")], apart
+
+
 @pytest.mark.long
 def test_a_simulation_stops_and_goes_back_as_the_run() -> None:
     scene = hanging(time={"duration": 7, "step": 0.02})
