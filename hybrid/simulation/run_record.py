@@ -488,7 +488,7 @@ def lines_of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:
             older = {"rho": rho, "report": mine["report"]} | {x: mine[x] for x in REFERENCES if x in mine}
             line = older | line | {"before": mine["before"] | before if isinstance(before, dict) else before}
         if mine is not None and isinstance(line.get("noted"), dict):
-            line = line | {"noted": mine["noted"] | line["noted"]}
+            line = line | {"noted": mine["noted"] | {k: x for k, x in line["noted"].items() if k != "_left_out"}}
         found[name] = line
     return found
 
