@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import hybrid
 import hybrid.simulation.run
 from tests.combinations.pairs import scene_of
 from tests.scenes import cable_scene, each_line, pinned_at
+from tests.simulation.bits import resumed
 from tests.validation.test_validation_body_contact import RADIUS, STRAND, on_two_lines, pushed
 from tests.validation.test_validation_lines_contact import AREA, DENSITY, crossing, force_between, lowered
 from tests.validation.test_validation_lines_contact import RADIUS as ROPE
@@ -304,6 +306,17 @@ def test_what_a_paid_rope_does_to_another_is_booked(whole: hybrid.Result) -> Non
     assert max(np.abs(x["work/zones"]).max() for x in (upper, lower)) < 5e-3 * winch
     assert float(upper["work/friction"][-1] + lower["work/friction"][-1]) < 0.0
     np.testing.assert_allclose(upper["energy/self_contact"], lower["energy/self_contact"], atol=1e-12)
+
+
+@pytest.mark.long
+def test_contact_of_a_paid_rope_with_one_whose_cells_follow_goes_on_to_the_bit(tmp_path: Path) -> None:
+    """Contact has cells as long as they were when its arrays were made, in a run that is resumed, too: 3e-9 m apart."""
+    tables = limp(in_and_out(0.8))
+    tables["lines"]["upper"]["connections"]["end"]["payout"]["longest"] = 1.11
+    tables["lines"]["upper"]["model"] = "rod"
+    follows = {"kind": "adaptive", "tolerance": 2e-3, "hold_time": 0.2, "curvature_error": 0.05}
+    tables["lines"]["lower"]["model"] = follows
+    assert np.ptp(resumed(tables, tmp_path, 0.6).lines["upper"]["payout/length"]) > 0.01
 
 
 def test_first_in_the_scene_or_last_it_is_the_same(whole: hybrid.Result) -> None:
