@@ -324,7 +324,7 @@ class Vibrations:
 def _harmonic_until(quiet: float, o: float, w: Floats, unit: Floats, duration: float) -> Floats:
     """Integral until `quiet` (s) of  u'' exp(-i w t)  for  u = Re(unit exp(-i o t))  that has grown slowly, (m,).
 
-    At resonance it is no larger than over the duration, s: frequencies count as 1 rad of that apart.
+    duration: s, of the motion, in which frequencies count as at least 1 rad apart: resonance grows no longer.
     """
     near = np.where(o < w, -1.0, 1.0) * np.maximum(np.abs(o - w), 1.0 / duration)
     up = unit.conj() * np.exp(1j * near * quiet) / (1j * near)

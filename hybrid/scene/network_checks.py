@@ -274,7 +274,7 @@ def _of_network(network: Network, name: str, found: Finding) -> Finding:
 
 def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Iterator[Finding]:
     if name not in known:
-        tables = {"point": "points", "body": "bodies", "line": "lines"}[what]
+        tables = {"point": "points", "body": "bodies", "line": "lines"}[what.split()[-1]]
         expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
         fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
         yield Finding(at, expected, fix)
