@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import cycle
 from typing import Any
 
@@ -193,13 +194,15 @@ def _along_line(line: Result, outputs: list[int], most: int) -> list[dict[str, A
             s, values = found.curve(found.values[outputs])
             some = np.union1d(even(len(s), 2 * most), np.flatnonzero(np.isnan(values).any(axis=0)))
             curves[name] = s[some], values[:, some]
-    out = []
+    out, meshes = [], None
+    with suppress(KeyError):  # it is of an earlier program
+        meshes = line.mesh
     for k, i in enumerate(outputs):
         own = {name: [_plain(s), _plain(values[k])] for name, (s, values) in curves.items()}
         clearance = _clearance(line, position[k])
         if clearance is not None:
             own["clearance"] = [_plain(line.s[kept]), _plain(clearance)]
-        nodes = line.mesh[i].s if "mesh/s" in line else np.zeros(0)
+        nodes = meshes[i].s if meshes is not None else np.zeros(0)
         shape = {"s": _plain(line.s[kept])} | {x: _plain(position[k, :, j]) for j, x in enumerate("xyz")}
         zones = [[z.kind, z.s_a, z.s_b, colour_of(z.kind)] for z in whole_zones(line.zones[i])]
         mesh = {"nodes": _plain(nodes) if len(nodes) <= MOST_NODES else [], "cells": max(len(nodes) - 1, 0)}

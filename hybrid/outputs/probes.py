@@ -15,7 +15,7 @@ stays.  An end stays where it is, with its moment or, where it is clamped, its d
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from itertools import pairwise
@@ -58,7 +58,7 @@ from hybrid.outputs.observed_states import NO_HINGES, Grid, VaryingGrid
 from hybrid.outputs.quantities import Quantities
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
-from hybrid.store.records import THERE, node_bits
+from hybrid.store.records import RIDES, THERE, node_bits
 
 # --- errors of curvature at edges of contact ---------------------------------------------------
 
@@ -446,9 +446,9 @@ class Features(NamedTuple):
     """What a line has along it, or may have in the course of a run.
 
     loads: arc lengths of point loads, m; changes: those where one section ends and the next begins; hinges: (2 + K, 3)
-    as of `Material`; kinds: of zones that there may be, None: those that there are; finest: m, all nodes that there may
-    be, where cells follow the curvature; payout: nodes that go along with a winch at the end, negative: at the start;
-    obstacles: their names.
+    as of `Material`; kinds: of zones that there may be, None: those that there are.
+    finest: m, all possible nodes, but for those that ride with a winch; None: outputs do not name their nodes.
+    rides: how many do at the end, negative: at the start; payout: the same of a line in motion; obstacles: their names.
     """
 
     loads: Sequence[float] = ()
@@ -456,6 +456,7 @@ class Features(NamedTuple):
     hinges: Floats = NO_HINGES
     kinds: set[str] | None = None
     finest: Floats | None = None
+    rides: int = 0
     payout: int = 0
     obstacles: Sequence[str] = ()
 
@@ -493,7 +494,7 @@ class Observer:
         recorded: Recorded,
     ) -> None:
         s, jumps = points
-        self._finest = features.finest
+        self._finest, self._rides = features.finest, features.rides
         self._hinges = features.hinges.copy()
         self._cuts, self._changes = tuple(sorted({*features.loads, *jumps})), tuple(features.changes)
         near = SAME_PLACE * line.s[-1]
@@ -518,7 +519,11 @@ class Observer:
             Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
             for name, (_, text) in zip(self._criteria, recorded.criteria, strict=True)
         ]
-        self.fields = (*fields, *self._fields_beside_the_line())
+        self.fields, self._left_out = (*fields, *self._fields_beside_the_line()), frozenset[str]()
+
+    def leave_out(self, names: Collection[str]) -> None:
+        """Leave out fields of these names, which a file does not have."""
+        self.fields, self._left_out = tuple(f for f in self.fields if f.name not in names), frozenset(names)
 
     def _fields_of_probes(self) -> list[Field]:
         sizes = {"s": self.s.size, "xyz": 3, "edge": 2}
@@ -546,6 +551,8 @@ class Observer:
         if self._finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
             fields.append(Field(THERE, "", text, (-(-self._finest.size // 64),), ("word",), dtype="int64"))
+            text = "arc lengths of nodes that ride with the winch"
+            fields += [Field(RIDES, "m", text, (abs(self._rides),), ("rides",))] if self._rides else []
         return fields
 
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone], hinges: Floats) -> Observer:
@@ -657,9 +664,12 @@ class Observer:
             out["elevation"] = elevation(self.sea, self.gauges, batch.sea_now)
         out |= obstacle_values(self._obstacles, batch.obstacles) | obstacle_force_values(self._touched, plain)
         if self._finest is not None:
-            lines = [x.line for x in plain.outputs] if isinstance(plain, JoinedObservation) else [self.line]
-            rows = [node_bits(self._finest, line.s) for line in lines]
+            rides = self._rides
+            stay, ride = (slice(-rides), slice(-rides, None)) if rides > 0 else (slice(-rides, None), slice(-rides))
+            rows = [node_bits(self._finest, s[stay]) for s in plain.nodes]
             out[THERE] = np.tile(np.stack(rows), (batch.t.size // len(rows), 1))
+            riding = np.stack([s[ride] for s in plain.nodes])
+            out |= {RIDES: np.tile(riding, (batch.t.size // len(rows), 1))} if rides else {}
         if self._with_work:
             energy = sum((out[name] for name in out if name.startswith("energy/")), np.zeros(batch.t.size))
             if self.first_energy is None:
@@ -668,4 +678,4 @@ class Observer:
                 f"work/{name}": batch.work[:, k].copy() for k, name in enumerate(POWERS) if name in works_of(self.line)
             }
             out["work/scheme"] = energy - self.first_energy - batch.work.sum(axis=1)
-        return out
+        return {name: x for name, x in out.items() if name not in self._left_out} if self._left_out else out

@@ -313,24 +313,32 @@ class PayingOut:
         self, observer: Observer, model: Model, batch: Batch
     ) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """The outputs of a batch, each of a line as long as it was then, and the zones of all but the first."""
-        varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in varying(model.line)}
+        line = copied(model.line)
+        varied, zones = self.varied(line, model, batch)
+        there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
+        there.first_energy = observer.first_energy
+        e = self._fitting_chords(self.reel, model.line, batch.e, batch.T, varied["h"], varied["ck"])
+        return there, there.observation(batch._replace(e=e, h=varied["h"], kb=varied["kb"]), varied), zones[1:]
+
+    def varied(self, line: Line, model: Model, batch: Batch) -> tuple[dict[str, Floats], list[tuple[Zone, ...]]]:
+        """Arrays (nb, ...) of the line at each output of a batch that change, and its zones.
+
+        line (written): a copy of that of the model.
+        """
+        varied = {name: np.empty((batch.t.size, *getattr(line, name).shape)) for name in varying(line)}
         zones = []
         moving = model.zones if model.layout is not None else None
-        scratch = copied(model.line)
-        for k, (line, zones_then) in enumerate(self._lines_of(scratch, self.reel, batch, moving)):
+        for k, (then, zones_then) in enumerate(self._lines_of(line, self.reel, batch, moving)):
             zones.append(zones_then)
             for name, x in varied.items():
-                x[k] = getattr(line, name)
+                x[k] = getattr(then, name)
         if model.layout is not None:  # lengths and stiffness of zones that move
             kept, at = ~self.changing, np.arange(line.s.size)
             own = self.material - 1
             nodes = at < own if self.plan.side else at > line.h.size - own
             h, kb = (batch.h, batch.kb) if batch.h.ndim == 2 else (model.line.h[None], model.line.kb[None])  # of now
             varied["h"][:, kept], varied["kb"][:, nodes] = h[:, kept], kb[:, nodes]
-        there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
-        there.first_energy = observer.first_energy
-        e = self._fitting_chords(self.reel, model.line, batch.e, batch.T, varied["h"], varied["ck"])
-        return there, there.observation(batch._replace(e=e, h=varied["h"], kb=varied["kb"]), varied), zones[1:]
+        return varied, zones
 
     def _lines_of(
         self, line: Line, reel: Reel, batch: Batch, moving: tuple[Zone, ...] | None = None

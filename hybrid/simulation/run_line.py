@@ -34,7 +34,7 @@ from hybrid.kernels.state.books import (
     sample_size,
 )
 from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, copied, sampled_size, slip_size
 from hybrid.model.build import Model, as_begun, planar
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import follows_curvature, wants_errors
@@ -110,11 +110,12 @@ def observer_of(
     zones_move = moves and model.layout is not None
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
-    finest = model.finest_nodes if zones_move and follows_curvature(scene) and only is None else None
-    paid, obstacles = 0, () if only else model.sea.names
-    if moves and model.payout is not None:
-        paid = model.payout.layer.size * (1 if model.payout.side else -1)
-    features = Features(model.attached, section_changes(scene), model.hinges, kinds, finest, paid, obstacles)
+    paid, obstacles = model.payout, () if only else model.sea.names
+    rides = 0 if paid is None else paid.layer.size * (1 if paid.side else -1)
+    changing = only is None and (rides or (zones_move and follows_curvature(scene)))
+    finest = model.finest_nodes if changing else None
+    of_cells = kinds, finest, rides if finest is not None else 0, moves * rides
+    features = Features(model.attached, section_changes(scene), model.hinges, *of_cells, obstacles)
     edges = moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED)
     gauges, asked = () if only else scene.output.elevation or (), None if only else quantities_of(scene)
     recorded = Recorded(moves and only is None, only, criteria, edges, gauges, asked)
@@ -507,6 +508,12 @@ class RunLine:
             model = self.model
             self.observer = self.observer.on(model.line, model.sea.values, model.zones, self.books.hinges)
         return self.observer, self.observer.observation(batch), []
+
+    def paid_out(self, batch: Batch) -> tuple[Floats, Floats]:
+        """Arc lengths (nb, N+1) and lengths of cells (nb, N), m, of outputs."""
+        assert self.paying is not None
+        varied, _ = self.paying.varied(copied(self.model.line), self.model, batch)
+        return varied["s"], varied["h"]
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""

@@ -231,7 +231,9 @@ def fields_of_pairs(model: NetworkModel) -> list[Field]:
     return pair_fields([(model.names[a], model.names[b]) for a, b in _pairs(model).values()])
 
 
-def values_of_pairs(model: NetworkModel, shared: SharedContact | None, states: Sequence[Batch]) -> dict[str, Floats]:
+def values_of_pairs(
+    model: NetworkModel, shared: SharedContact | None, states: Sequence[Batch], of: Sequence[RunLine]
+) -> dict[str, Floats]:
     """Values (nb, ...) of those fields, from nb states of all lines; shared: their contact, None: nothing touches."""
     found: dict[str, Floats] = {}
     nb, pairs = len(states[0].t), _pairs(model)
@@ -240,12 +242,14 @@ def values_of_pairs(model: NetworkModel, shared: SharedContact | None, states: S
         found |= {f"{at}/{key}": np.zeros((nb, 3) if key == "force" else nb) for key in KEYS[a == b :]}
     if shared is None or not pairs:
         return found
-    lines, mine = Lines(shared.contact, shared.line), [states[k] for k in shared.lines]
+    mine = {k: states[k] for k in shared.lines}
+    paid = {k: of[k].paid_out(x) for k, x in mine.items() if of[k].paying is not None}
     for output in range(nb):
-        touch = np.concatenate([x.touch[output] for x in mine])
+        touch = np.concatenate([x.touch[output] for x in mine.values()])
         if not touch.any():
             continue
-        r = np.concatenate([x.r[output] for x in mine])
+        lines = Lines(shared.contact, shared.with_lengths({k: (s[output], h[output]) for k, (s, h) in paid.items()}))
+        r = np.concatenate([x.r[output] for x in mine.values()])
         for pair, values in pair_forces(lines, r, touch).items():
             at = "contacts/" + "/".join(model.names[k] for k in pairs[pair])
             for key, value in zip(KEYS, values, strict=True):

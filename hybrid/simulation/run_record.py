@@ -62,10 +62,10 @@ from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_steps import no_extremes
 from hybrid.solve.stepper import LineFailed, NetworkState
 from hybrid.store.format import Field, Header, Text, made
-from hybrid.store.hdf5_file import opened
+from hybrid.store.hdf5_file import opened, root_of
 from hybrid.store.integrity import matched
 from hybrid.store.recorder import Rows
-from hybrid.store.records import PENDING, RODS_AT_START
+from hybrid.store.records import PENDING, RIDES, RODS_AT_START, THERE
 from hybrid.store.stored_rows import ComparisonRecorder
 from hybrid.store.whole_file import Checkpoint, read_checkpoint
 from hybrid.store.writer import AT_ONCE, Recorder, WriteMode
@@ -211,7 +211,13 @@ class RunFile:
         """The result from a checkpoint of an open file on."""
         recorder, fixed = self.begin(), list[tuple[Field, np.ndarray]]()
         assert isinstance(recorder, Recorder)
-        if self._alone is not None:  # whose file may be of a program that did not write them
+        for line in self._run.lines:  # whose file may be of a program that did not write them
+            within, rows = root_of(source, "" if self._alone is not None else line.name), line.recorder
+            if lacks := {THERE, RIDES} & {f.name for f in line.observer.fields if f.name not in within}:
+                assert isinstance(rows, Rows)
+                line.observer.leave_out(lacks)
+                rows.use_fields(line.observer.fields)
+        if self._alone is not None:  # likewise
             (line,) = self._run.lines
             fixed = [*line.envelope.fixed(), *mesh_fields(line.model)]
         recorder.resume(source, point, fixed, self._asks.pending)
@@ -224,7 +230,7 @@ class RunFile:
             return
         values = values_of(run.network, run.model, seen)
         self.rotations.unwind(values)
-        values |= values_of_pairs(run.model, run.solver.shared, seen.lines)
+        values |= values_of_pairs(run.model, run.solver.shared, seen.lines, run.lines)
         by_name = {line.name: x for line, x in zip(run.lines, seen.lines, strict=True)}
         values |= self.quantities.values(by_name, {line.name: line for line in run.lines})
         run.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])

@@ -360,6 +360,14 @@ class SharedContact(ContactBooks):
         """(N+1,) m, arc lengths of the nodes of all lines as parts of the one that begin there."""
         return np.concatenate([s + start for s, start in zip(self._own, starts, strict=True)])
 
+    def with_lengths(self, lengths: Mapping[int, tuple[Floats, Floats]]) -> Line:
+        """The one line, with other arc lengths and lengths of cells, m, of lines by number."""
+        line, of = self.line._replace(s=self.line.s.copy(), h=self.line.h.copy()), self.slices()
+        for k, (s, h) in lengths.items():
+            begin = of[k].start
+            line.s[of[k]], line.h[begin : begin + h.size] = s + self.starts[self.lines.index(k)], h
+        return line
+
     @property
     def last(self) -> int:
         """The number of the line at which it is asked."""

@@ -73,12 +73,9 @@ class Rows:
     def __init__(self, header: Header) -> None:
         fields, step_fields, fixed = header.fields, header.step_fields, header.fixed
         check_names(fields, step_fields, fixed)
-        self._tables = tables_of(fields, step_fields)
-        self._all = tuple(Table(group, columns) for group, columns in self._tables.items())
-        self._outputs, self._steps, self._zone_rows, self._events = self._all
-        self._names = {f.name for f in fields}
         self._step_names = [f.name for f in step_fields]
         self._finite_steps = [k for k, f in enumerate(step_fields) if not f.nan_ok]
+        self._use(fields, step_fields)
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
         self._happened: Counter[str] = Counter()  # events by kind
@@ -94,6 +91,16 @@ class Rows:
         self._attributes: dict[str, Any] = dict(attributes_of_format()) | status_attributes("running", "")
         write_attributes(SimpleNamespace(attrs=self._attributes), header.attributes)
         self._texts = {name: text for name, text in header.texts.items() if text}
+
+    def _use(self, fields: Sequence[Field], step_fields: Sequence[Field]) -> None:
+        self._tables = tables_of(fields, step_fields)
+        self._all = tuple(Table(group, columns) for group, columns in self._tables.items())
+        self._outputs, self._steps, self._zone_rows, self._events = self._all
+        self._names = {f.name for f in fields}
+
+    def use_fields(self, fields: Sequence[Field]) -> None:
+        """Have outputs of these fields, some of those of the header: before there is one."""
+        self._use(fields, self._steps.fields)
 
     def contents(self, parts: Mapping[str, ArrayContents] | None = None) -> ArrayContents:
         """All of it that is not written; the rows of its tables wait no more.  parts: results of lines by name."""

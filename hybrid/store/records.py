@@ -80,7 +80,8 @@ class Mesh(NamedTuple):
         return f"<mesh of {h.size} cells of {h.min():.4g} to {h.max():.4g} m: {count}>"
 
 
-THERE = "mesh/there"  # the field of a line whose cells follow the curvature
+# Fields of a line whose cells follow the curvature, or which is paid out, and of one that is.
+THERE, RIDES = "mesh/there", "mesh/rides"
 
 
 def node_bits(s: np.ndarray, nodes: np.ndarray) -> np.ndarray:
@@ -180,12 +181,20 @@ class ZoneHistory(Sequence[list[Zone]]):
 class MeshHistory(Sequence[Mesh]):
     """`mesh[i]`: the cells at output i, in the order of s."""
 
-    def __init__(self, s: np.ndarray, always: np.ndarray, zones: ZoneHistory, words: np.ndarray | None = None) -> None:
+    def __init__(
+        self,
+        s: np.ndarray,
+        always: np.ndarray,
+        zones: ZoneHistory,
+        words: np.ndarray | None = None,
+        rides: np.ndarray | None = None,
+    ) -> None:
         """Which of the nodes s (K,) m there are at every output.
 
-        always: (K,) those outside of rods as well; words: the nodes of every output, of `node_bits`; None: all in rods.
+        always: (K,) those outside of rods as well; words: the nodes of every output, of `node_bits`; None: all in rods;
+        rides: (nt, M) m, nodes beside them, on a winch.
         """
-        self._s, self._always, self._zones, self._words = s, always.astype(bool), zones, words
+        self._s, self._always, self._zones, self._words, self._rides = s, always.astype(bool), zones, words, rides
 
     def __len__(self) -> int:
         return len(self._zones)
@@ -200,7 +209,7 @@ class MeshHistory(Sequence[Mesh]):
             there = np.unpackbits(self._words[i].astype("<i8").view(np.uint8), bitorder="little")[: s.size] == 1
         else:
             there = self._always | (names[np.searchsorted(bounds, s)] == "rod")  # of a bound, the zone before it
-        nodes = s[there]
+        nodes = s[there] if self._rides is None else np.sort(np.concatenate([s[there], self._rides[i]]))
         return Mesh(nodes, names[np.searchsorted(bounds, 0.5 * (nodes[1:] + nodes[:-1]))])
 
 

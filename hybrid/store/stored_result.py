@@ -17,6 +17,7 @@ Layout, format 1 (`record` writes it)::
                                     extremes of all accepted steps from begin to end, over nodes (`envelope`)
     /extremes/{<name>,t/<name>}     of named quantities: smallest and largest of all accepted steps, and when
     /mesh/{s,always}                nodes that there may be, and whether they are there outside of rod zones as well
+    /mesh/{there,rides}             which of them there are at each output, and nodes that ride with a winch
     /scene                          the scene, as YAML text
     /changes                        scenes that held from some time on, as JSON; only where there are any
     /lines/<name>/*                 of several lines, each with this layout (`lines`)
@@ -48,6 +49,7 @@ from hybrid.store.records import (
     OLD_EVENTS,
     OLD_NAMES,
     PENDING,
+    RIDES,
     THERE,
     Attributes,
     Contents,
@@ -357,9 +359,14 @@ class StoredResult:
 
     @property
     def mesh(self) -> MeshHistory:
-        """`mesh[i]`: the cells at output i, their nodes s (N+1,) m and kinds (N,); fields are on the output grid."""
-        words = self[THERE] if THERE in self.names else None
-        return MeshHistory(self["mesh/s"], self["mesh/always"], self.zones, words)
+        """`mesh[i]`: the cells at output i, their nodes s (N+1,) m and kinds (N,); fields are on the output grid.
+
+        KeyError: of a line that is paid out, a file of an earlier program does not say them.
+        """
+        if "payout/length" in self.names and RIDES not in self.names:
+            raise KeyError("an earlier program has not written which cells there were of a line that is paid out")
+        words, rides = (self[x] if x in self.names else None for x in (THERE, RIDES))
+        return MeshHistory(self["mesh/s"], self["mesh/always"], self.zones, words, rides)
 
     @property
     def scene_text(self) -> str:

@@ -19,8 +19,11 @@ from test_payout import clamped, exchanged, kicks, sagging
 from test_system_payout import crane, to_a_buoy
 
 import hybrid
+import hybrid.simulation.run_line
 from hybrid.errors import SceneError
+from hybrid.outputs.probes import Observer
 from hybrid.simulation.payout_nodes import NodeChanges
+from hybrid.simulation.run_line import observer_of
 from tests.inside import calls_of
 
 Tables = dict[str, Any]
@@ -347,6 +350,42 @@ def test_resumed_bit_for_bit(name: str, tmp_path: Path) -> None:
     whole = resumed(scene, tmp_path, *stops)
     for line in whole.lines.values() or [whole]:
         assert "payout/length" not in line or np.ptp(line["payout/length"]) > 0.01
+
+
+@pytest.mark.parametrize("scene", [nearly_in(), of_sections()], ids=["cells that follow", "from the start"])
+def test_the_mesh_of_an_output_has_the_nodes_that_ride_with_the_winch(scene: Tables) -> None:
+    """Those of the line that steps have led to then; both ends of its zones are among them."""
+    result, stepped = hybrid.run(scene), hybrid.Simulation(scene)
+    sizes = set()
+    for i, t in enumerate(result.times):
+        while stepped.t < t - 1e-9:
+            stepped.step()
+        mesh, zones = result.mesh[i], result.zones[i]
+        np.testing.assert_allclose(mesh.s, stepped._run.lines[0].model.line.s, rtol=0, atol=1e-13)
+        assert [zones[0].s_a, zones[-1].s_b] == pytest.approx(mesh.s[[0, -1]], abs=1e-12)
+        sizes.add(mesh.s.size)
+    assert len(sizes) > 1
+
+
+def test_a_file_that_does_not_say_which_nodes_ride_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As earlier programs wrote it: what follows is the same, and nobody is told of a mesh that it does not have."""
+    scene, lacks = nearly_in(), ("mesh/there", "mesh/rides")
+    scene["ends"]["end"]["payout"]["longest"] = 13.0
+    whole, path = hybrid.run(scene), tmp_path / "part.h5"
+
+    def older(*args: Any, **options: Any) -> Observer:
+        observer = observer_of(*args, **options)
+        observer.leave_out(lacks)
+        return observer
+
+    with monkeypatch.context() as patched:
+        patched.setattr(hybrid.simulation.run_line, "observer_of", older)
+        hybrid.run(scene | {"time": scene["time"] | {"duration": 1.5}}, path).close()
+    found = hybrid.resume(path, until=float(whole.times[-1]))
+    assert not {*lacks} & {*found.names}
+    np.testing.assert_array_equal(found.position, whole.position)
+    with pytest.raises(KeyError, match="earlier program"):
+        _ = found.mesh
 
 
 BACK = {
