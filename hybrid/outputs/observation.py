@@ -234,11 +234,6 @@ class Observation(ObservedStates):
         return means_beside(self.grid.s, self.line.s, touch) if self.grid.s.size > 1 else self.grid.chords @ touch.T
 
     @property
-    def nodes(self) -> Sequence[Floats]:
-        """Arc lengths (N+1,) m of the nodes of each output, or of all."""
-        return [*self._varied["s"]] if "s" in self._varied else [self.line.s]
-
-    @property
     def payout(self) -> Floats:
         """(3, nb) of a line that is paid out: its length, m, the rate of that, m/s, power of the winch on it, W."""
         return self.batch.report[:, LENGTH_OUT : PAYOUT_POWER + 1].T
@@ -399,10 +394,6 @@ class JoinedObservation(Observation):
     @property
     def columns(self) -> int:
         return 1
-
-    @property
-    def nodes(self) -> Sequence[Floats]:
-        return [x.line.s for x in self.outputs]
 
     @cached_property
     def changes(self) -> list[int]:

@@ -666,10 +666,13 @@ class Observer:
         if self._finest is not None:
             rides = self._rides
             stay, ride = (slice(-rides), slice(-rides, None)) if rides > 0 else (slice(-rides, None), slice(-rides))
-            rows = [node_bits(self._finest, s[stay]) for s in plain.nodes]
-            out[THERE] = np.tile(np.stack(rows), (batch.t.size // len(rows), 1))
-            riding = np.stack([s[ride] for s in plain.nodes])
-            out |= {RIDES: np.tile(riding, (batch.t.size // len(rows), 1))} if rides else {}
+            if isinstance(plain, JoinedObservation):
+                each = [x.line.s for x in plain.outputs]
+            else:
+                each = [plain.line_of(k).s for k in range(batch.t.size if plain.varies else 1)]
+            known = {THERE: [node_bits(self._finest, s[stay]) for s in each]}
+            known |= {RIDES: [s[ride] for s in each]} if rides else {}
+            out |= {name: np.tile(np.stack(x), (batch.t.size // len(each), 1)) for name, x in known.items()}
         if self._with_work:
             energy = sum((out[name] for name in out if name.startswith("energy/")), np.zeros(batch.t.size))
             if self.first_energy is None:
