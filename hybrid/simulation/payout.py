@@ -350,7 +350,7 @@ class PayingOut:
         line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
         reel = reel._replace(numbers=reel.numbers.copy(), true=reel.true.copy(), stage=np.zeros_like(reel.stage))
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
-        if not self.holds_tension:  # exactly, where samples interpolate
+        if not (self.holds_tension or self.plan.from_outside):  # exactly, where samples interpolate
             known = np.flatnonzero(batch.t >= self.law[0, 0])
             there = lengths_at(self.law, batch.t[known])
             batch.report[known, LENGTH_OUT], batch.report[known, PAYOUT_RATE] = there
@@ -436,14 +436,14 @@ class PayingOut:
             getattr(self.reel, name)[:] = x
         return self.on(model, float(self.reel.numbers.length))
 
-    def advance(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
-        """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.
+    def law_from_outside(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> Floats | None:
+        """How a length set from Python goes where it is asked to, or on at its rate.
 
-        asked: its length, m, and rate, m/s, at the end; no length: the one to which an even change of the rate leads.
-        ValueError: it cannot be so long, or so short.
+        begin, end: of it, s; asked: its length, m, and rate, m/s, at the end; no length: the one to which an even
+        change of the rate leads.  None: it is not set from Python.  ValueError: it cannot be so long, or so short.
         """
         if not self.plan.from_outside or self.ended or self.stopped:
-            return
+            return None
         L, c, _ = length_at.py_func(self.law, begin)
         length, rate = asked or (None, c)
         dt = end - begin
@@ -453,6 +453,10 @@ class PayingOut:
         law[:, 0] = begin, end
         law[0, 4:] = (c + rate - 2.0 * mean) / dt**2, (3.0 * mean - 2.0 * c - rate) / dt, c, L
         law[1, 6:] = rate, to
+        return law
+
+    def use_law(self, law: Floats) -> None:
+        """Go by a law of `law_from_outside` from now on."""
         if self.law.shape == law.shape:
             self.law[:] = law
         else:

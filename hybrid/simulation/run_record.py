@@ -132,7 +132,8 @@ class RunFile:
     @property
     def _length(self) -> float:
         """Of the only line, m; 0: lines have no arc lengths in common."""
-        return self._run.lines[0].model.length if self._alone is not None else 0.0
+        line = self._run.lines[0]
+        return (line.paying or line.model).length if self._alone is not None else 0.0
 
     @property
     def span(self) -> tuple[float, float]:

@@ -17,6 +17,7 @@ import numpy as np
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.report import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
 from hybrid.kernels.state.state import Floats, State, obstacles_now
+from hybrid.kernels.step.step_control import decimal_time
 from hybrid.model.ends import STILL, DrivenEnd, rotation_vector
 from hybrid.model.mesh import Zone
 from hybrid.model.network import NetworkModel
@@ -79,7 +80,7 @@ def end_of_step(now: float, step: float | None, duration: float) -> float:
         raise ValueError("steps follow the motion: use advance(until), or give time.step")
     taken, until = round(now / step), now + step
     if abs(taken * step - now) < SLIVER * step:
-        until = (taken + 1) * step  # a multiple of the step, without round-off that adds up
+        until = decimal_time.py_func((taken + 1) * step)  # where steps of a run end, without round-off that adds up
     return until if duration - until > SLIVER * step else duration
 
 

@@ -205,9 +205,21 @@ class Simulation(SteppedPoints):
         return min(float(until), duration)
 
     def _start_courses(self, now: float, until: float) -> None:
-        """What has been set is on its way from `now` to `until` (s)."""
+        """What has been set is on its way from `now` to `until` (s).
+
+        ValueError: something of it is refused, and nothing is on its way.
+        """
+        laws = {}
         for k, paying in self._paid:
-            paying.advance(now, until, self._wound.pop(k, None))
+            try:
+                laws[k] = paying.law_from_outside(now, until, self._wound.get(k))
+            except ValueError:
+                self._wound.pop(k, None)
+                raise
+        self._wound.clear()
+        for k, paying in self._paid:
+            if (law := laws[k]) is not None:
+                paying.use_law(law)
         one_step = until - now <= ONE_STEP * (self._fixed_step or self._run.last_step)
         for name, ends in self._driven.items():
             set_out(ends, self._next.pop(name, None), now, until, one_step)

@@ -396,7 +396,12 @@ def case_of(path: str | Path, case: int, output: str | Path | None = None, *, pa
     if changed := [file for file, digest in json.loads(attributes["files"]).items() if digest_of(file) != digest]:
         raise ResultError(f"{', '.join(changed)} has changed since {path} was computed: the case would be another one")
     stored, parts = json.loads(attributes["study"]), checked_parts(parts)
-    require_parts(parts, stored.get("parts", ()), path)
+    named = [x if isinstance(x, list) else [x, None] for x in stored.get("parts", ())]  # in older ones names alone
+    kept: dict[str, str | None] = {name: state for name, state in named}
+    require_parts(parts, kept, path)
+    if other := ", ".join(name for name, x in _states_of(parts) if kept[name] not in (x, None)):
+        advice = "the numbers that it was given then"
+        raise ResultError(f"{path} was computed with another part {other}\n    try:      {advice}")
     if not 0 <= case < len(stored["rows"]):
         raise ResultError(f"{path} has no case {case}\n    expected: 0 to {len(stored['rows']) - 1}")
     scene = scene_of(stored["base"], stored["keys"], stored["rows"][case])
@@ -481,9 +486,14 @@ def _identity(
 ) -> str:
     kept: dict[str, Any] = {name: each.model_dump(mode="json") for name, each in wanted.items()}
     kept |= {"whole files": True} if files else {}
-    kept |= {"parts": [[x.name, pack(x.checkpoint()).hex()] for x in parts]} if parts else {}
+    kept |= {"parts": _states_of(parts)} if parts else {}
     kept |= {"derive": dict(derived), "release": version("hybrid-cable")}  # results of two releases are not mixed
     return hashlib.sha256((cases.identity + json.dumps(kept, sort_keys=True)).encode()).hexdigest()[:16]
+
+
+def _states_of(parts: Sequence[RunPart]) -> list[tuple[str, str]]:
+    """Names of parts, and what each would keep in a checkpoint."""
+    return [(x.name, pack(x.checkpoint()).hex()) for x in parts]
 
 
 def _refuse_other(file: StudyFile, identity: str) -> None:
@@ -516,7 +526,7 @@ def _created(
         array = values_of.astype(float) if values_of.dtype.kind == "i" else values_of
         columns[name] = Column("", asked.derive[name], (), array)
     stored = {"base": cases.base, "keys": cases.keys, "rows": rows, "static": cases.static}
-    stored |= {"parts": [x.name for x in parts]} if parts else {}
+    stored |= {"parts": _states_of(parts)} if parts else {}
     texts: dict[str, Any] = {"study": stored, "variables": list(columns), "files": cases.files, "bounds": cases.bounds}
     texts |= {"sample": asked.sample.model_dump() if asked.sample else None}
     texts |= {"collect": {name: each.model_dump(mode="json") for name, each in wanted.items()}}

@@ -184,6 +184,8 @@ def test_the_runs_of_a_study_have_it(tmp_path: Path) -> None:
     assert most[1] == out(alone).max() and 20 < most[0] < 26 and most[1] < 26
     with pytest.raises(hybrid.ResultError, match="computed with the part guard"):
         hybrid.study_case(tmp_path / "study.zarr", 1)
+    with pytest.raises(hybrid.ResultError, match="another part guard"):
+        hybrid.study_case(tmp_path / "study.zarr", 1, parts=[Guard(500.0)])
     with pytest.raises(hybrid.ResultError, match="holds another study"):
         hybrid.study(path, parts=[Guard(500.0)])
 
@@ -233,6 +235,28 @@ def test_runs_to_compare_with_have_it() -> None:
     """Else the winch would not stop in them, and their difference would be called an error."""
     result = hybrid.run(hanging(accuracy="5%", mesh={"cells": 60}), parts=[Guard()])
     assert np.max(result["errors/total/position"]) < 0.5, "m, where 3 m more are out without"
+
+
+class Saying(hybrid.RunPart):
+    """Notes of the whole run at every half second."""
+
+    name = "saying"
+
+    def after_step(self, run: hybrid.RunView) -> None:
+        if abs(run.t - round(2.0 * run.t) / 2.0) < 1e-9:
+            run.note("so far")
+
+
+def test_a_note_of_the_whole_run_is_of_all_that_is_out_then(tmp_path: Path) -> None:
+    """In a resumed run, too: its model judges by the length that it had."""
+    scene = hanging(time={"duration": 4, "step": 0.05})
+    whole = hybrid.run(scene, tmp_path / "whole.h5", parts=[Saying()])
+    hybrid.run(scene | {"time": scene["time"] | {"duration": 2.3}}, tmp_path / "part.h5", parts=[Saying()]).close()
+    hybrid.resume(tmp_path / "part.h5", until=4.0, parts=[Saying()]).close()
+    assert not (apart := differences(tmp_path / "whole.h5", tmp_path / "part.h5")), apart
+    spans = {round(e.t, 9): e.s_b for e in of_kind(whole, "part saying")}
+    known = dict(zip(whole.times.round(9).tolist(), out(whole).tolist(), strict=True))
+    assert len(spans) == 8 and all(s == pytest.approx(known[t], abs=1e-9) for t, s in spans.items())
 
 
 class Silent(hybrid.RunPart):

@@ -339,6 +339,21 @@ def test_a_length_set_from_python_is_that_of_the_scene(side: str) -> None:
     np.testing.assert_allclose(result["payout/length"], given["payout/length"], atol=1e-9)
 
 
+def test_outputs_of_a_length_set_from_python_do_not_know_when_they_are_written() -> None:
+    """`save` writes those that wait: outputs within steps, whose length is that of the step, have the same bits."""
+    found = []
+    for saves in (False, True):
+        with hybrid.Simulation(hanging({"longest": 60.0}, 2.0) | {"output": {"every": 0.065}}) as sim:
+            while sim.t < 1.99:
+                sim.set_payout(0.05 * (sim.t + 0.05))
+                sim.step()
+                if saves:
+                    sim.save()
+            found.append(sim.result())
+    for name in ("payout/length", "position", "tension"):
+        assert found[0][name].tobytes() == found[1][name].tobytes()
+
+
 def test_wrong_uses_from_python_are_refused_and_harmless() -> None:
     with hybrid.Simulation(hanging({"longest": 60.0}, 5.0)) as sim:
         for bad in (100.0, 1.0, float("nan"), "10", None, True, [40.0]):

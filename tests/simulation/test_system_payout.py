@@ -84,6 +84,20 @@ def test_from_outside_lengths_are_of_the_rates_that_are_set() -> None:
     np.testing.assert_allclose(length, trapezoids[: len(length)], rtol=1e-12)
 
 
+def test_a_rate_that_is_refused_takes_no_other_with_it() -> None:
+    """What was set of the line before it holds when the step is made at last, and only what was wrong is to be set anew."""
+    scene = crane({"longest": 60.0})
+    scene["lines"]["tug"]["connections"]["start"]["payout"] = {"longest": 60.0}
+    with hybrid.Simulation(scene) as sim:
+        sim.set_payout("wire", 0.4)
+        sim.set_payout("tug", 1e3)
+        with pytest.raises(ValueError, match="the length that is out would be"):
+            sim.advance(0.25)
+        sim.advance(0.25)
+        lengths = [sim.result().lines[x]["payout/length"][-1] for x in ("wire", "tug")]
+    assert lengths == pytest.approx([30.0 + 0.5 * 0.4 * 0.25, 50.0], abs=1e-9)
+
+
 def frame(sign: float) -> dict[str, Any]:
     """A body that hangs from a fixed point has a winch, from which 500 kg hang."""
     wire = {"mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e9}
