@@ -33,7 +33,6 @@ from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.solve.stepper import LineFailed, NetworkState
-from hybrid.store.integrity import matched
 from hybrid.zones.change import ZoneSwitching, rods_at_winch
 from hybrid.zones.manager import Change, DomainManager, Reason
 
@@ -351,19 +350,13 @@ class RunPayout(Part):
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next steps depend on, by line."""
-        lines, models = self._run.lines, self._run.model.models
-        # a model judges by the length that it was made with
-        each = {k: x.checkpoint() | {"length": models[k].length} for k, x in self.lines.items()}
-        return {"payout": {lines[k].name: x for k, x in each.items()}}
+        return {"payout": {self._run.lines[k].name: x.checkpoint() for k, x in self.lines.items()}}
 
     def restore_cells(self, saved: Mapping[str, Any]) -> bool:
         """Give lines the cells and the reels of a checkpoint.  ValueError: they are none of them."""
         run, states, saved = self._run, [*self._run.state.lines], saved["payout"]
         for k, x in self.lines.items():
-            kept = dict(saved[run.lines[k].name])
-            length = kept.pop("length", None)  # a file of an earlier program has none
-            model = x.restore(kept, run.model.models[k])
-            model = model if length is None else replace(model, length=matched(length, 0.0, "payout/length"))
+            model = x.restore(saved[run.lines[k].name], run.model.models[k])
             if k in self.zones:
                 self.zones[k].resume(model)
             run.model = run.model.with_lines({k: model})

@@ -243,7 +243,7 @@ def values_of_pairs(
     if shared is None or not pairs:
         return found
     mine = {k: states[k] for k in shared.lines}
-    paid = {k: of[k].paid_out(x) for k, x in mine.items() if of[k].paying is not None}
+    paid = {k: of[k].paid_out(x) for k, x in mine.items() if of[k].paying is not None and x.touch.any()}
     for output in range(nb):
         touch = np.concatenate([x.touch[output] for x in mine.values()])
         if not touch.any():

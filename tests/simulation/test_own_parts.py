@@ -248,7 +248,7 @@ class Saying(hybrid.RunPart):
 
 
 def test_a_note_of_the_whole_run_is_of_all_that_is_out_then(tmp_path: Path) -> None:
-    """In a resumed run, too: its model judges by the length that it had."""
+    """In a resumed run, too."""
     scene = hanging(time={"duration": 4, "step": 0.05})
     whole = hybrid.run(scene, tmp_path / "whole.h5", parts=[Saying()])
     hybrid.run(scene | {"time": scene["time"] | {"duration": 2.3}}, tmp_path / "part.h5", parts=[Saying()]).close()
