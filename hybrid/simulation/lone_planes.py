@@ -231,9 +231,9 @@ class LonePlanes(Part):
 
     name, wants = "planes", b.LEAVES_PLANE | b.PUSH_DIED | b.NEARS_PLANE
 
-    def __init__(self, run: RunOfLines, counts: b.Counts, insists: bool) -> None:
-        """counts: of its steps; insists: whether the scene asks for two dimensions."""
-        self._run = run
+    def __init__(self, run: RunOfLines, counts: b.Counts, insists: bool, begins: bool) -> None:
+        """counts: of its steps; insists: whether the scene asks for two dimensions; begins: whether it is a start."""
+        self._run, self._begins = run, begins
         self._lines = {
             k: LonePlane(k, run.lines[k], counts, insists)
             for k, x in enumerate(run.model.models)
@@ -251,15 +251,15 @@ class LonePlanes(Part):
         s = float(self._run.model.models[k].line.s[node])
         self._run.lines[k].events.event(self._run.t, s, s, kind, text)
 
-    def place(self) -> None:
-        """Lines that begin in their planes are computed there, from states that lie in them exactly."""
-        for k, x in self._lines.items():
-            if self._may(k):
-                x.begin(self._run.model.models[k], self._run.state.lines[k], partial(self._note, k))
-
     def fit_lines(self) -> None:
-        """Lines go into their planes, but for those that touch, or lie in no plane, now."""
-        changes = {}
+        """Lines go into their planes, but for those that touch, or lie in no plane, now.
+
+        Those that begin in their planes do so from states that lie in them exactly.
+        """
+        changes, begins, self._begins = {}, self._begins, False
+        for k, x in self._lines.items():
+            if begins and self._may(k):
+                x.begin(self._run.model.models[k], self._run.state.lines[k], partial(self._note, k))
         for k, x in self._lines.items():
             model, may = self._run.model.models[k], self._may(k)
             stays = model.layout is None and model.payout is None
@@ -286,11 +286,6 @@ class LonePlanes(Part):
         """Line k goes on in space, as if it had been there always."""
         run = self._run
         self._lines[k].leave(run.model.models[k], run.state.lines[k], run.lines[k].shares)
-
-    def adopt_cells(self, number: int, line: Line) -> None:
-        """Steps have carried the push to other cells of a line."""
-        if number in self._lines:
-            self._lines[number].use_cells_of(line)
 
     def note_step(self) -> None:
         """Hear of what a step has flagged: pushes that are given anew, and lines that are to leave or to come back."""
@@ -328,7 +323,7 @@ class LonePlanes(Part):
             found[names[k]] = {"plane": x.plane, "home": x.home, "push": push}
         return {"planes": found}
 
-    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
+    def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Lines are in the planes of a checkpoint.  ValueError: they have none."""
         saved = saved["planes"]
         if not isinstance(saved, Mapping):

@@ -88,6 +88,8 @@ class HasPlane(Protocol):
 
     pushes: tuple[Floats, Floats]
 
+    def use_cells_of(self, line: Line) -> None: ...
+
 
 class OfRun(Protocol):
     """And of the run of all lines (simulation.run)."""

@@ -29,7 +29,7 @@ from hybrid.simulation.own_parts import OwnParts
 from hybrid.simulation.parts import EVERY_STEP, Part, Parts
 from hybrid.simulation.progress import at_once
 from hybrid.simulation.restart import LoadChange, kept_resolution, other_program, refused, require_same
-from hybrid.simulation.run_contact import RunContact, refuse_within_itself
+from hybrid.simulation.run_contact import AT_START, RunContact, refuse_within_itself
 from hybrid.simulation.run_line import RunLine, Wanted
 from hybrid.simulation.run_of_lines import (
     FirstStates,
@@ -83,6 +83,7 @@ class Run(RecordedRun):
 
     notes: Sequence[tuple[str, str]] = ()  # events (kind, text) of the whole of the run
     begun: Callable[[Run], None] | None = None  # called behind the first output
+    let_go: Callable[[Weakness, str], None]  # lets ends of lines go between two steps; why, for the event.  LineFailed
     stepped_outside = False  # whether steps are asked for one by one (simulation.stepping)
     _fitted: tuple[object, ...] | None = None  # what steps are attached to that have come to a stop
 
@@ -130,13 +131,12 @@ class Run(RecordedRun):
         assert self.found is not None
         try:
             self.solver = solver = self.found.solver
-            if not self.found.settled:
-                refuse_within_itself(self.model, solver.lines, self.state, moves=False)
+            self._refuse_overlaps()
             self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, solver.anchor)  # what nothing holds has no report without its springs
             for part in self.parts:
-                part.at_rest()
+                part.begin()
             self.renew_other()
             self.loop.attach(solver, self.state, self.other)
             self._output()
@@ -153,16 +153,8 @@ class Run(RecordedRun):
             else:
                 self.stops()
                 self._let_jump(self.t, self.resolution.one.step)  # loads that a run up to here has left as they were
-
-            for t in sorted({t for part in self.parts for t in part.phases}):
-                for stop in self.stops(t):
-                    self.go_to(stop)
-                for part in self.parts:
-                    while t in part.phases:
-                        part.begin_phase(t)
+            while not self._reach_end():
                 self.keep()
-            for stop in self.stops():
-                self.go_to(stop)
             self._pause(finished=True)
             self.finish()
         except LineFailed as failed:
@@ -170,6 +162,22 @@ class Run(RecordedRun):
         except KeyboardInterrupt:
             self.finish("interrupted", f"stopped from outside at t = {self.t:.6g} s")
             raise
+
+    def _reach_end(self) -> bool:
+        """Go to the end; False: only to where other loads begin to hold, and other stops with them."""
+        network = self.network
+        for stop in self.stops():
+            self.go_to(stop)
+            if self.network is not network:
+                return False
+        return True
+
+    def _refuse_overlaps(self) -> None:
+        """SceneError: lines for which contact is asked are within themselves, or each other, at the start."""
+        if self.found is None:
+            refuse_within_itself(self.model, self.solver.lines, self.state, self.moves, AT_START)
+        elif not self.found.settled:
+            refuse_within_itself(self.model, self.solver.lines, self.state, self.moves)
 
     def _pause(self, finished: bool = False) -> None:
         """What is due about ten times a second; finished: at the end."""
@@ -188,11 +196,8 @@ class Run(RecordedRun):
         """Make the start ready for steps, and record it."""
         if self.found is None:
             begin_as_placed(self.model, self.scenes, self.state, [line.events for line in self.lines])
-        for part in self.parts:
-            part.place()
         self.make_solver()
-        for part in self.parts:
-            part.balance()
+        self._refuse_overlaps()
         for point, text in blended_of_lines(self.network):
             if text:
                 self.noted.event(0.0, *self.file.place(point), "motion blended in", text)
@@ -213,45 +218,38 @@ class Run(RecordedRun):
         self.gather_events()
         self._between = True
         self.loop.set_quota(LOOK if self.loop.counts.asks else ROWS)
-        for begin in self.parts.at_stop:
-            begin()
         self.keep()
         self._logged = self._spent()
 
-    def stops(self, until: float | None = None) -> list[float]:
-        """Times (s) at which a step ends: where loads jump, the end, and outputs if that is asked.
-
-        until: s, the last of them; None: the end of the run.
-        """
-        end = self.end if until is None else until
+    def stops(self) -> list[float]:
+        """Times (s) at which a step ends: where loads jump, the end, and outputs if that is asked."""
+        end = self.end
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
         self._jumps = sorted({x for each in given for x in each if x < end})
-        self._breaks = sorted({*self._jumps, *(x for part in self.parts for x in part.breaks if x < end)})
+        self._breaks = sorted({*self._jumps, *(x for part in self.parts for x in part.stops if x < end)})
         outputs = [x for x in self.times if x < end] if self.network.output.exact else []
-        last = self.times[-1] if until is None else until
         steps = [x for x in self.resolution.one.ends if x < end]
         if self.loop.controlled:
-            grown = [*self.parts.begins, *(x for scene in self.scenes for x in ramp_ends(scene))]
-            steps += [x for x in grown if x < end]
-        return apart([*outputs, *steps, last, *self._breaks], self.t, self.resolution.one.step)
+            steps += [x for scene in self.scenes for x in ramp_ends(scene) if x < end]
+        return apart([*outputs, *steps, self.times[-1], *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float) -> None:
-        """Steps to `stop` (s), with what is due there."""
-        while (due := self.parts.due) < stop - SAME_STOP * self.resolution.one.step:
-            self._go_to(due)
-            self.write_log()
-            for part in self.parts:
-                if part.due == due:
-                    part.at_due()
-        self._go_to(stop)
-        for begin in self.parts.at_stop:
-            begin()
+        """Steps to `stop` (s), with what is due on the way; other loads begin to hold where that ends before."""
+        network, near, arrives = self.network, SAME_STOP * self.resolution.one.step, False
+        while not arrives:
+            if self.parts.due <= self.t:
+                self.write_log()
+            for begin in self.parts.begin_leg:
+                begin()
+            if self.network is not network:
+                return
+            due = self.parts.due
+            arrives = not due < stop - near
+            self._go_to(stop if arrives else due)
 
     def _go_to(self, stop: float) -> None:
         """The same, with nothing due on the way."""
         loop, step = self.loop, self.resolution.one.step
-        for begin in self.parts.begin_leg if loop.controlled else ():
-            begin()
         even = self.network.output.exact or bool(self.resolution.one.ends) or not falls_on(stop, self._breaks, step)
         steps = equal_steps(self.leg, self.t, stop, step, even)
         self.leg = steps[:2]
@@ -265,7 +263,7 @@ class Run(RecordedRun):
         What is asked around a step takes as long as a step of a hundred cells, and nearly always finds nothing.
         """
         loop, one = self.loop, self.resolution.one
-        if loop.controlled or self.parts.begins or self.network.output.exact or one.ends:
+        if loop.controlled or self.network.output.exact or one.ends:
             self.go_to(stop)  # each stop has a say in the lengths of steps
             return
         steps = equal_steps(self.leg, self.t, stop, one.step, False)
@@ -286,14 +284,15 @@ class Run(RecordedRun):
 
     def _fitting(self) -> tuple[object, ...]:
         """What compiled steps are attached to: where it is the same, and they have come to a stop, they go on."""
-        own = (x for attached_to in self.parts.attached_to for x in attached_to())
-        return self.solver, self.model, *(x.ends.moves() for x in self.model.models), *own
+        reels = (x.paying.reel for x in self.lines if x.paying is not None)
+        return self.solver, self.model, *(x.ends.moves() for x in self.model.models), *reels
 
     def _run_attached(self) -> int:
         """Compiled steps, which are attached to what there is, until a code of kernels.state.books."""
         code = self.loop.go()
-        for sync in self.parts.sync:
-            sync()
+        for line in self.lines:
+            if line.cells is not None:
+                line.cells.sync()  # Python knows of the cells of now
         self.state, self.other = self.loop.states
         return code
 
@@ -335,28 +334,29 @@ class Run(RecordedRun):
 
     def _prepare(self, t: float) -> None:
         """Ends, loads and zones as they are at the end of a try, t (s)."""
-        for prepare in self.parts.prepare:
-            prepare(t)
+        for judge in self.parts.judge_try:
+            judge(b.TRYING)
         self.place_ends(t)
         self.model.update_water(t, self.state.bodies, t - self.t, self.solver.bodies)
 
     def _judge(self) -> None:
         """After a try: it may have to be made again, with other lines."""
         self._go_back(True)
-        if any([part.wants_retry() for part in self.parts]):
+        if any([judge(b.TRIED) for judge in self.parts.judge_try]):
             self.loop.try_again()
         self._go_back(False)
 
     def _failed_step(self) -> None:
         """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
-        dt = float(self.loop.clock.tried_dt)
         self._go_back(True)
-        if not any([part.gives_up(dt) for part in self.parts]):
+        try:
+            any(judge(b.FAILED) for judge in self.parts.judge_try)  # the last raises where none before gives in
+        except LineFailed:
             if not self.stepped_outside:  # else the step may be taken back
                 self._record_last()
             for line in self.lines:
                 line.write_down()  # what stopped the run before comes first
-            raise self._explained(self.loop.tried, dt)
+            raise
         self._go_back(False)
         self.loop.try_whole()
 
@@ -374,12 +374,6 @@ class Run(RecordedRun):
         for wants, change in self.parts.after_step:
             if wants & notices:
                 change()
-
-    def release(self, weakness: Weakness, why: str) -> None:
-        """Let ends of lines go now, between two steps; why: for the event.  LineFailed."""
-        self.record_samples()  # of ends as they were until now
-        for part in self.parts:
-            part.break_now(weakness, why)
 
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): an output, which is of the moment before, and other loads."""
@@ -528,9 +522,10 @@ def _equip(run: Run, first: First, network: Network, text: Text, recording: Reco
         parts.append(payout)
     run.file = RunFile(me, network, named, text, recording)
     _add_lines(run, first, recording, payout.lines if payout is not None else {})
-    contact = RunContact(me, recording.touches, run.target is not None)
+    contact, failures = RunContact(me, recording.touches, run.target is not None), Failures(me)
+    run.let_go = failures.break_now
     if recording.planes and moves:
-        parts.append(LonePlanes(me, run.loop.counts, network.dimension == 2))
+        parts.append(LonePlanes(me, run.loop.counts, network.dimension == 2, not first.resumed))
     shaken = zip(named.items(), run.resolution.lines.values(), strict=True)
     vibrations = {name: VibrationSteps(scene, x) for (name, scene), x in shaken}
     if moves:
@@ -548,7 +543,7 @@ def _equip(run: Run, first: First, network: Network, text: Text, recording: Reco
         FirstStates(me),
         contact,
         Cuts(me, contact, run.target is None),
-        Failures(me),
+        failures,
     ]
     parts += [VibrationsOfLines(vibrations, run.loop.clock), run.file.quantities, run.file.rotations]
     run.parts = Parts([*parts, RunRecorder(me), FloatingWatch(me, moves)])
@@ -567,6 +562,8 @@ def _add_lines(run: Run, first: First, recording: Recording, paid: Mapping[int, 
         line = RunLine(k, name, shown, model, run.found, state, outputs, wanted, paid.get(k))
         run.lines.append(line)
         line.manager = manager
+        if not first.resumed:
+            line.diagnostics.begin()
 
 
 def start_of(network: Network, model: NetworkModel, moves: bool, criterion: UserCriterion | None) -> Start:

@@ -17,7 +17,7 @@ from hybrid.kernels.contact.lines_distance import JOINT
 from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Line
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.build import Model
 from hybrid.model.contents import contact_bits, touching, touching_among, touching_no_more
 from hybrid.model.network import NetworkModel
@@ -113,28 +113,24 @@ class RunContact(Part):
         for line in self._run.lines:
             line.shares = among is not None and line.number in among.lines
 
-    def touching(self, remeshes: bool) -> tuple[list[SelfContact | None], SharedContact | None]:
-        """Contact of the lines as they are, of each with itself and of all, which goes on with what there was."""
+    def fit_lines(self) -> None:
+        """Contact of the lines as they are, of each with itself and of all, goes on with what there was."""
         run = self._run
+        self._note_meetings(self.shared)
         own = {line.number: line.contact for line in run.lines if line.shares and line.contact is not None}
         contacts, shared = [line.touch_itself(run.t) for line in run.lines], shared_of(run.model, rubs=True)
         if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
-            shared.restore(self.shared.checkpoint(run.t), run.t, remeshed=remeshes)
+            remeshed = any(line.remeshes for line in run.lines)
+            shared.restore(self.shared.checkpoint(run.t), run.t, remeshed=remeshed)
         elif shared is not None and (own or self.shared is not None):
             shared.copy_from(self.shared, own, run.t)
-        self.shared = shared
-        return contacts, shared
+        self.shared, run.touching = shared, (contacts, shared)
 
     def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Look in the steps of another solver which lines pass through each other."""
         if self.watch is not None:
             self._note_passages()
         self._watch_lines()
-
-    def at_rest(self) -> None:
-        """Look which lines overlap in an equilibrium."""
-        self._watch_lines()
-        self._find_overlaps()
 
     def _watch_lines(self) -> None:
         """Look from now on which lines overlap without contact, beside those that are known to."""
@@ -166,23 +162,23 @@ class RunContact(Part):
             )
             run.recorder.event(0.0, 0.0, 0.0, PASSED, text)
 
-    def balance(self) -> None:
-        """Contact is computed from now on of lines that are near themselves where the run begins."""
+    def begin(self) -> None:
+        """Contact begins of lines that are near themselves, or each other, at the start."""
         run = self._run
-        if run.found is None:
-            refuse_within_itself(run.model, run.solver.lines, run.state, True, AT_START)
-        elif not run.found.settled:
-            refuse_within_itself(run.model, run.solver.lines, run.state, True)
+        if not run.moves:
+            self._watch_lines()
+            self._find_overlaps()
+            return
         step = run.resolution.one.step
         for line, state in zip(run.lines, run.state.lines, strict=True):
             line.nears_itself = line.envelope.itself.is_near(run.t, state, step)
-        self._begin_alone()
-
-    def begin(self) -> None:
-        """Likewise of lines that are near each other there."""
+        begun = self._begin_alone()
         self._find_overlaps()
         if self.watch is not None and self.watch.near() and self._begin_between():
-            self._run.balance()
+            begun = True
+        if begun:
+            run.balance()
+        self._note_meetings(run.solver.shared)
 
     # --- checkpoints ----------------------------------------------------------------------------------
 
@@ -195,19 +191,16 @@ class RunContact(Part):
         found |= {name: sorted(list(x) for x in pairs) for name, pairs in said.items()}
         return found if self.shared is None else found | {"contact": self.shared.checkpoint(run.t)}
 
-    def restore_joints(self, saved: Mapping[str, Any]) -> bool:
-        """Lines touch themselves and each other."""
+    def restore_lines(self, saved: Mapping[str, Any]) -> bool:
+        """Lines touch themselves and each other, and know their partners again."""
         near = [x.number for x in self._run.lines if "self_contact" in of_line(saved, x.name) and not x.touches]
         self._let_touch(near)
-        between = _pairs(saved["between"])
-        if between:
+        among, between = self._run.model.touching, _pairs(saved["between"])
+        others = bool(between) and (among is None or between != {*among.pairs})
+        if others:
             self._touch_each_other(between)
-        return bool(near or between)
-
-    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
-        """Lines know their partners again."""
         self._note_partners()
-        return False
+        return bool(near) or others
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """That has been said, and lines stick where they did."""
@@ -229,8 +222,8 @@ class RunContact(Part):
         if parted := [line.number for line in run.lines if line.parts_itself and not line.shares]:
             self._end_alone(parted)
 
-    def _begin_alone(self) -> None:
-        """Contact is computed from now on of lines that have come near themselves.
+    def _begin_alone(self) -> bool:
+        """Contact is computed from now on of lines that have come near themselves; whether any begins.
 
         Those within themselves go on without.  Nothing moves; energy that contact has at once is booked as that of a
         change of zones.
@@ -256,6 +249,7 @@ class RunContact(Part):
         if begun:
             self._let_touch(begun)
             run.go_on_changed(begun, "where contact of the line with itself begins")
+        return bool(begun)
 
     def _end_alone(self, numbers: Sequence[int]) -> None:
         """Contact is computed no longer of lines of these numbers, until they come near themselves again."""
@@ -334,8 +328,11 @@ class RunContact(Part):
 
     # --- given up -------------------------------------------------------------------------------------
 
-    def gives_up(self, dt: float) -> bool:
-        """No step of dt (s) leads on: contact that began by itself is computed no longer; whether there was any."""
+    def judge_try(self, code: int) -> bool:
+        """No step leads on: contact that began by itself is computed no longer; whether there was any."""
+        return code == b.FAILED and self._gives_up(float(self._run.loop.clock.tried_dt))
+
+    def _gives_up(self, dt: float) -> bool:
         run, numbers = self._run, []
         for line in run.lines:
             contact = line.contact
@@ -379,9 +376,17 @@ class RunContact(Part):
 
     # --- what is told ---------------------------------------------------------------------------------
 
-    def gather(self) -> None:
+    def log(self, rows: Floats, cpu: Floats) -> None:
+        """Tell which lines have met in these steps."""
+        self._note_meetings(self._run.solver.shared)
+
+    def finish(self, status: str) -> None:
+        """Likewise in an equilibrium."""
+        self._note_meetings(self._run.solver.shared)
+
+    def _note_meetings(self, shared: SharedContact | None) -> None:
         """An event for every two lines that have met, with contact or without, when they do first."""
-        run, shared = self._run, self._run.solver.shared
+        run = self._run
         for a, c, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
             if (a, c) in self._met:
                 continue

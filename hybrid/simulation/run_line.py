@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_law import OUTER
@@ -27,6 +28,7 @@ from hybrid.kernels.state.books import (
     PARTS_ITSELF,
     STRAINS,
     STRETCHED,
+    ZONES,
     Books,
     Clock,
     Counts,
@@ -34,7 +36,18 @@ from hybrid.kernels.state.books import (
     sample_size,
 )
 from hybrid.kernels.state.report import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, copied, sampled_size, slip_size
+from hybrid.kernels.state.state import (
+    Batch,
+    Ends,
+    Floats,
+    Line,
+    State,
+    Work,
+    batch_of_one,
+    copied,
+    sampled_size,
+    slip_size,
+)
 from hybrid.model.build import Model, as_begun, planar
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import follows_curvature, wants_errors
@@ -57,7 +70,7 @@ from hybrid.solve.stability import slack_cell
 from hybrid.solve.stepper import JoinedLine, LineFailed
 from hybrid.store.recorder import Rows
 from hybrid.store.stored_rows import ComparisonRecorder
-from hybrid.zones.manager import DomainManager
+from hybrid.zones.manager import Change, DomainManager
 
 if TYPE_CHECKING:
     from hybrid.simulation.cell_changes import CellChanges
@@ -126,6 +139,17 @@ def observer_of(
     return observer
 
 
+class ZonesOfLine(Protocol):
+    """What moves the zones of a line (simulation.run_zones)."""
+
+    @property
+    def remeshes(self) -> bool: ...
+    def change_line(self, change: Callable[[Line], Line]) -> None: ...
+    def use_loads(self, model: Model) -> None: ...
+    def release(self, end: int, model: Model) -> None: ...
+    def switch(self, change: Change, here: NDArray[np.bool_] | None) -> None: ...
+
+
 class Waiting(NamedTuple):
     """What waits to be recorded of a line."""
 
@@ -149,6 +173,7 @@ class RunLine:
     contact: SelfContact | None = None
     shares = False  # whether its contact is computed with that of other lines
     manager: DomainManager | None = None  # of zones that move
+    zones: ZonesOfLine | None = None  # what moves them
     shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
     _most = 1  # outputs that may wait
     _sampled: Sequence[Output] = ()  # of several meshes, of which `output` is still to be told
@@ -360,6 +385,36 @@ class RunLine:
         self.model = model
         self.diagnostics.use_model(model)
         self.envelope.itself.adopt_cells(model)
+        if self.plane is not None:  # steps have carried the push to them
+            self.plane.use_cells_of(model.line)
+
+    @property
+    def changes_cells(self) -> bool:
+        """Whether other cells come: its zones move, or it is paid out."""
+        return self.zones is not None or self.paying is not None
+
+    @property
+    def remeshes(self) -> bool:
+        """Whether its nodes come and go: cells follow the curvature, or it is paid out."""
+        return self.paying is not None or (self.zones is not None and self.zones.remeshes)
+
+    def change_line(self, model: Model, change: Callable[[Line], Line]) -> None:
+        """Go on with a model whose line is changed so on the same cells."""
+        self.use_model(model)
+        if self.zones is not None:
+            self.zones.change_line(change)
+
+    def use_loads(self, model: Model) -> None:
+        """Go on with a model of other loads and motions on the same cells."""
+        self.use_model(model)
+        if self.zones is not None:
+            self.zones.use_loads(model)
+
+    def let_go(self, end: int, t: float, model: Model, state: State) -> None:
+        """An end, 0 or 1, is to come loose at t (s): at a winch no more line comes."""
+        if self.paying is not None and self.paying.plan.side == end:
+            self.write_down()  # with the law as it is
+            self.books.work[0, ZONES] += self.paying.end(state, t, model)
 
     @property
     def watch_table(self) -> Table | None:

@@ -5,12 +5,12 @@ Parts name this, and not the run whose steps they are asked in.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from hybrid.model.contents import touching
 from hybrid.model.ends import table_of_loads
 from hybrid.model.nearby import unclamped, without_hold
 from hybrid.model.network import NetworkModel, NetworkResolution, build_network
+from hybrid.model.plan import SAME_STOP
 from hybrid.scene.base import Table
 from hybrid.scene.network import Network
 from hybrid.scene.schema import LineScene
@@ -35,6 +36,7 @@ from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.run_line import MOST_WAITING, RunLine
 from hybrid.simulation.run_quantities import RunQuantities
+from hybrid.solve.contact import SelfContact, SharedContact
 from hybrid.solve.lines_at_rest import LinesAtRest
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import MOST_SAMPLED, NetworkSteps
@@ -45,6 +47,9 @@ from hybrid.store.whole_file import digest_of
 from hybrid.store.writer import Recorder
 from hybrid.zones.change import on_layout
 from hybrid.zones.manager import UserCriterion
+
+if TYPE_CHECKING:  # what a run without winches does not load
+    from hybrid.simulation.payout import PayingOut
 
 AnyRecorder = Recorder | ComparisonRecorder
 
@@ -85,6 +90,8 @@ class RunOfLines:
     changes: Sequence[LoadChange[Network]] = ()  # of loads
     rest: Floats  # bodies when the motion began
     found: LinesAtRest | None  # from which it starts
+    touching: tuple[list[SelfContact | None], SharedContact | None]  # contact of each line with itself, and of all
+    contact_energy: Floats | None = None  # (L,) J, of each line, after the last accepted step; None: tries change none
     loaded = 0.0  # s, loads that have stopped by then act no more
     leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
     cpu = 0.0  # s, of the processor, in earlier parts of the run
@@ -160,14 +167,12 @@ class RunOfLines:
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""
-        for part in self.parts:
-            part.fit_lines()
-        remeshes = any(part.remeshes for part in self.parts)
-        contacts, shared = next(y for part in self.parts if (y := part.touching(remeshes)) is not None)
+        for fit_lines in self.parts.fit_lines:
+            fit_lines()
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         for line, x in zip(self.lines, lines, strict=True):
             line.held = x.ends.held
-        self.solver = NetworkSolver(lines, len(self.model.free), bodies, contacts, shared, self.resolution.tolerance)
+        self.solver = NetworkSolver(lines, len(self.model.free), bodies, *self.touching, self.resolution.tolerance)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
         for use_solver in self.parts.use_solver:
@@ -195,8 +200,6 @@ class RunOfLines:
         line, self.model = self.lines[number], self.model.with_lines({number: model})
         self.solver.adopt_cells(number, model.line, model.sea.values, work, line.books)
         line.adopt_cells(model)
-        for part in self.parts:
-            part.adopt_cells(number, model.line)
 
     def end_step(self) -> None:
         """Nothing of the step that led here is left to do, of which a checkpoint would not know."""
@@ -240,10 +243,6 @@ class RunOfLines:
             self._loaded = self.loaded
             loop.load(*table_of_loads(self.model.growing_loads(self.loaded)))
 
-    def _explained(self, taken: NetworkTaken, dt: float) -> LineFailed:
-        """Why no step of dt (s) leads on; 0: why there are no accelerations."""
-        return next(x for part in self.parts if (x := part.explains(taken, dt)) is not None)
-
     def restart_steps(self) -> None:
         """Loads, or what holds the lines, are others now: accelerations jump."""
         self.balance()
@@ -256,18 +255,12 @@ class RunOfLines:
         self.place_ends(self.t)
         self.model.update_water(self.t, self.state.bodies, 0.0, solver.bodies)
 
-        def solve() -> None:
-            lengthening: dict[int, Floats] = {}
-            with ExitStack() as stack:
-                for forces_on in self.parts.forces_on:
-                    lengthening |= stack.enter_context(forces_on())
-                taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
-            if taken.outcome != Outcome.OK:
-                raise self._explained(taken, 0.0)
+        def solve(lengthening: Mapping[int, Floats]) -> NetworkTaken:
+            return solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
 
-        for accelerate in self.parts.accelerate_rotors:
-            accelerate(solve)
-        solve()
+        for find_accelerations in self.parts.find_accelerations:
+            solve = find_accelerations(solve)
+        solve({})
 
     # --- other lines in mid-motion --------------------------------------------------------------------
 
@@ -284,17 +277,15 @@ class RunOfLines:
         """These lines, by number, are changed so on the same cells; the solver has still to follow."""
         models = {k: replace(x := self.model.models[k], line=change(x.line)) for k, change in changes.items()}
         for k, change in changes.items():
-            self.lines[k].use_model(models[k])
-            for part in self.parts:
-                part.change_line(k, change)
+            self.lines[k].change_line(models[k], change)
         self.model = self.model.with_lines(models)
 
     def go_on_changed(self, numbers: Iterable[int], after: str) -> None:
         """Another solver, for lines of these numbers that have changed, and that share contact with those.
 
-        What that changes of the energy of contact is booked: of all lines, where a part knows that of the last step.
+        What that changes of the energy of contact is booked: of all lines, where that of the last step is known.
         """
-        known = next((x for part in self.parts if (x := part.contact_before()) is not None), None)
+        known = self.contact_energy
         of = range(len(self.lines)) if known is not None else numbers
         before = {k: float(self.solver.work[k].report[SELF_CONTACT_ENERGY] if known is None else known[k]) for k in of}
         self.renew_solver(after)
@@ -308,8 +299,12 @@ class RunOfLines:
         taken = self.solver.forces_in_motion(self.state, self.t)
         if taken.outcome != Outcome.OK:
             raise LineFailed(taken.line, taken.outcome, self.t, None, after)
-        for note in self.parts.note_forces:
-            note()
+        self.note_contact()
+
+    def note_contact(self) -> None:
+        """Keep the energy of contact of the state, before other cells change it."""
+        if self.contact_energy is not None:
+            self.contact_energy[:] = [work.report[SELF_CONTACT_ENERGY] for work in self.solver.work]
 
     # --- outputs ----------------------------------------------------------------------------------------
 
@@ -321,8 +316,6 @@ class RunOfLines:
 
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the network with their names, as they happened."""
-        for gather in self.parts.gather:
-            gather()
         self.file.gather()
 
     def _output(self) -> None:
@@ -376,24 +369,17 @@ class FirstStates(Part):
     def __init__(self, run: RunOfLines) -> None:
         self._run = run
 
-    def place(self) -> None:
-        """Note what the contents of the models warn of."""
-        for line in self._run.lines:
-            line.diagnostics.begin()
-
     def begin(self) -> None:
-        """Note it of a start."""
+        """Note it of a start, or of an equilibrium that is the result."""
+        if not self._run.moves:
+            for line, x in zip(self._run.lines, self._run.solver.lines, strict=True):
+                line.held = x.ends.held
+            self._note(None)
+            return
         self._note(0.0)
         for line in self._run.lines:
             line.diagnostics.scheme(self._run.network.require_time().rho_inf)
             line.diagnostics.watch(line.books.clock)
-
-    def at_rest(self) -> None:
-        """Note it of an equilibrium that is the result."""
-        self.place()
-        for line, x in zip(self._run.lines, self._run.solver.lines, strict=True):
-            line.held = x.ends.held
-        self._note(None)
 
     def _note(self, t: float | None) -> None:
         """t: s, where a motion starts, None: there is none."""
@@ -409,6 +395,7 @@ class FirstStates(Part):
 
 # Tables of a network in which loads and motions stand.
 LOADED = ("environment", "points", "bodies")
+NO_WINCH: Mapping[int, PayingOut] = MappingProxyType({})
 
 
 def with_loads_of(network: Network, other: Network) -> Network:
@@ -417,15 +404,15 @@ def with_loads_of(network: Network, other: Network) -> Network:
 
 
 def loaded_as(
-    model: NetworkModel, network: Network, t: float, fits: Iterable[Callable[[NetworkModel], NetworkModel]] = ()
+    model: NetworkModel, network: Network, t: float, paid: Mapping[int, PayingOut] = NO_WINCH
 ) -> NetworkModel:
     """The same network from t (s) on with the loads and motions of a network; what is joined or loose stays so.
 
-    fits: each gives a model the cells of now of some lines, in place of those of t = 0.
+    paid: of lines that are paid out, by number, which keep the cells of now in place of those of t = 0.
     """
     other = build_network(network, model.resolution, model)
-    for fit in fits:
-        other = fit(other)
+    on_now = {k: replace(other.models[k], layout=model.models[k].layout) for k in paid}
+    other = other.with_lines({k: x.on(on_now[k], x.length) for k, x in paid.items()})
     models = tuple(_line_as(*each, network, t) for each in zip(model.names, model.models, other.models, strict=True))
     touching = model.touching
     if touching is not None:
@@ -467,24 +454,28 @@ class LoadChanges(Part):
         self._run, self._changes, self._made = run, changes, made
 
     @property
-    def phases(self) -> Sequence[float]:
-        """When the others begin to hold (s)."""
-        return [x.t for x in self._changes[self._made :]]
+    def due(self) -> float:
+        """When the next one begins to hold (s)."""
+        return min((x.t for x in self._changes[self._made :]), default=math.inf)
 
-    def begin_phase(self, t: float) -> None:
+    def begin_leg(self) -> None:
+        """Those hold from now on whose time has come."""
+        while self.due <= self._run.t + SAME_STOP * self._run.resolution.one.step:
+            self._change()
+
+    def _change(self) -> None:
         """The next one holds from now on: lines stay what they are and where they are."""
         run, network = self._run, self._changes[self._made].scene
         run.ends_of_now()
         for line in run.lines:
             line.write_down()
         run.gather_events()  # in the order in which they happen
-        run.network, run.model = network, loaded_as(run.model, network, run.t, [x.fit_models for x in run.parts])
+        paid = {line.number: line.paying for line in run.lines if line.paying is not None}
+        run.network, run.model = network, loaded_as(run.model, network, run.t, paid)
         run.loaded = run.t  # loads that end now, or would have ended before, act no more
         run.start_from(run.rest)
         for line, model in zip(run.lines, run.model.models, strict=True):
-            line.use_model(model)
-        for part in run.parts:
-            part.change_loads()
+            line.use_loads(model)
         done = run.solver.body_work[:, DONE:SPRING].copy()
         run.make_solver()
         run.solver.body_work[:, DONE:SPRING] = done

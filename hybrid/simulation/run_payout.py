@@ -6,9 +6,9 @@ a winch Python changes the line, and the network gets another solver.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,13 +26,13 @@ from hybrid.model.mesh import Layout
 from hybrid.model.network import NetworkModel
 from hybrid.model.payout import FEWEST_CELLS
 from hybrid.scene.schema import LineScene
-from hybrid.simulation.parts import Part
+from hybrid.simulation.parts import Accelerations, Part
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.run_of_lines import RunOfLines
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.solve.network_steps import NetworkSteps
-from hybrid.solve.stepper import LineFailed, NetworkState
+from hybrid.solve.stepper import LineFailed, NetworkState, NetworkTaken
 from hybrid.zones.change import ZoneSwitching, rods_at_winch
 from hybrid.zones.manager import Change, DomainManager, Reason
 
@@ -171,16 +171,6 @@ class RunPayout(Part):
             x.table.move(row)
         self._nodes: dict[int, NodeChanges] = {}  # what lets nodes enter and leave without Python
 
-    @property
-    def remeshes(self) -> bool:
-        """Nodes enter and leave at a winch."""
-        return True
-
-    @property
-    def changed(self) -> Collection[int]:
-        """Numbers of the lines."""
-        return self.lines.keys()
-
     # --- steps ------------------------------------------------------------------------------------
 
     def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
@@ -224,29 +214,24 @@ class RunPayout(Part):
             if k not in self.zones:
                 run.lines[k].cells = self._nodes.get(k)
 
-    def attached_to(self) -> Iterable[object]:
-        """Their reels."""
-        return (x.reel for x in self.lines.values())
+    def find_accelerations(self, solve: Accelerations) -> Accelerations:
+        """With what acts because lengths change, and with winches that hold a tension."""
 
-    def sync(self) -> None:
-        """Python knows of the nodes of now."""
-        for x in self._nodes.values():
-            x.sync()
+        def among_lengths(lengthening: Mapping[int, Floats]) -> NetworkTaken:
+            with ExitStack() as stack:
+                for x in self.lines.values():
+                    stand_still(x.table.numbers)
+                for x in self.lines.values():
+                    stack.enter_context(x.forces_on())
+                return solve({**lengthening, **{k: x.lengthening for k, x in self.lines.items()}})
 
-    @contextmanager
-    def forces_on(self) -> Iterator[dict[int, Floats]]:
-        """While accelerations are found: lines with what acts because their lengths change.
+        def with_rotors(lengthening: Mapping[int, Floats]) -> NetworkTaken:
+            self._accelerate_rotors(partial(among_lengths, lengthening))
+            return among_lengths(lengthening)
 
-        It gives second rates (N,) m/s2 of the lengths of cells, by line.
-        """
-        with ExitStack() as stack:
-            for x in self.lines.values():
-                stand_still(x.table.numbers)
-            for x in self.lines.values():
-                stack.enter_context(x.forces_on())
-            yield {k: x.lengthening for k, x in self.lines.items()}
+        return with_rotors
 
-    def accelerate_rotors(self, solve: Callable[[], None]) -> None:
+    def _accelerate_rotors(self, solve: Callable[[], NetworkTaken]) -> None:
         """Winches that hold a tension: what is left of the balance of each is linear in the accelerations of all."""
         run = self._run
         free = {k: x for k, x in self.lines.items() if x.holds_tension and run.t > x.winch.begin}
@@ -311,8 +296,8 @@ class RunPayout(Part):
         zones = self.zones.get(k)
         first = zones.before_change() if zones is not None else None
         if first is not None:
-            for part in run.parts:
-                part.switch_zones(k, *first)
+            assert line.zones is not None
+            line.zones.switch(*first)
             states = [*run.state.lines]
         if zones is not None:
             zones.hand_over(run.t, states[k])
@@ -326,25 +311,10 @@ class RunPayout(Part):
         run.state = NetworkState(states, run.state.bodies)
         line.use_cells(model, books)
 
-    def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
-        """Ends (line, 0 or 1) come loose: at a winch no more line comes."""
-        run = self._run
-        for k, end in ends:
-            if k in self.lines and self.lines[k].plan.side == end:
-                run.lines[k].write_down()  # with the law as it is
-                model, books = run.model.models[k], run.lines[k].books
-                books.work[0, b.ZONES] += self.lines[k].end(run.state.lines[k], run.t, model)
-
     def begin_leg(self) -> None:
         """The next step is no longer than the laws of the lengths allow."""
-        for x in self.lines.values():
+        for x in self.lines.values() if self._run.loop.controlled else ():
             limit_next_step(x.table.numbers)
-
-    def fit_models(self, model: NetworkModel) -> NetworkModel:
-        """A model with other loads on the cells of t = 0, with the cells of now."""
-        now = self._run.model.models
-        found = {k: x.on(replace(model.models[k], layout=now[k].layout), x.length) for k, x in self.lines.items()}
-        return model.with_lines(found)
 
     # --- checkpoints ------------------------------------------------------------------------------
 
@@ -352,7 +322,7 @@ class RunPayout(Part):
         """What the next steps depend on, by line."""
         return {"payout": {self._run.lines[k].name: x.checkpoint() for k, x in self.lines.items()}}
 
-    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
+    def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Give lines the cells and the reels of a checkpoint.  ValueError: they are none of them."""
         run, states, saved = self._run, [*self._run.state.lines], saved["payout"]
         for k, x in self.lines.items():

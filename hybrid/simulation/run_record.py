@@ -425,8 +425,7 @@ def restore(run: RecordedRun, saved: Mapping[str, Any]) -> None:
     if is_of_cable(saved):
         saved = as_of_line(saved, run.lines[0].name, run.model.models[0], weaknesses(run.network))
     given, saved = saved, _of_today(run, saved)
-    joined = [part.restore_joints(saved) for part in reversed(run.parts)]
-    if any([*(part.restore_cells(saved) for part in reversed(run.parts)), *joined]):
+    if any([part.restore_lines(saved) for part in reversed(run.parts)]):
         run.make_solver()
     template = checkpoint(run) | {"control": None, "planes": None}
     for part in run.parts:

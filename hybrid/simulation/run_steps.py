@@ -32,7 +32,7 @@ from hybrid.model.resolution import Resolution, start_vibrations
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import LineScene
 from hybrid.simulation.events import energy_gains_text, slack_remedy
-from hybrid.simulation.parts import Part
+from hybrid.simulation.parts import Accelerations, Part
 from hybrid.simulation.run_contact import RunContact
 from hybrid.simulation.run_line import FORCE_COLUMNS, RunLine
 from hybrid.simulation.run_of_lines import RunOfLines
@@ -134,7 +134,7 @@ class VibrationsOfLines(Part):
         self._lines, self._clock = lines, clock
 
     @property
-    def begins(self) -> list[float]:
+    def stops(self) -> list[float]:
         """When vibrations begin, s."""
         return sorted({t for x in self._lines.values() for t in x.begins})
 
@@ -143,10 +143,13 @@ class VibrationsOfLines(Part):
         """When to look next (s) whether one lasts; infinity: none is there."""
         return min((x.look for x in self._lines.values()), default=np.inf)
 
-    def at_stop(self) -> None:
-        """Steps are short from here on if a vibration begins here."""
+    def begin_leg(self) -> None:
+        """Steps are short from here on if a vibration begins here, and long again where little of it shows."""
+        now = float(self._clock.now)
         for x in self._lines.values():
-            x.begin(float(self._clock.now))
+            if x.look <= now:
+                x.judge()
+            x.begin(now)
         self._bound()
 
     def log(self, rows: Floats, cpu: Floats) -> None:
@@ -154,16 +157,8 @@ class VibrationsOfLines(Part):
         for k, x in enumerate(self._lines.values()):
             x.log(rows[:, k, FORCE_COLUMNS])
 
-    def at_due(self) -> None:
-        """Longer steps, of lines that are looked at now, where little of the vibration shows."""
-        now = self.due
-        for x in self._lines.values():
-            if x.look == now:
-                x.judge()
-        self._bound()
-
     def _bound(self) -> None:
-        if self.begins:
+        if self.stops:
             self._clock.largest = min(x.largest for x in self._lines.values())
             self._clock.next_dt = min(self._clock.next_dt, self._clock.largest)
 
@@ -194,7 +189,7 @@ class Failures(Part):
         self.broken: list[int] = []  # numbers in `all`, in the order in which they broke
 
     @property
-    def breaks(self) -> list[float]:
+    def stops(self) -> list[float]:
         """Times (s) at which something breaks by itself."""
         return [x.time for k, x in enumerate(self.all) if np.isfinite(x.time) and k not in self.broken]
 
@@ -223,6 +218,7 @@ class Failures(Part):
 
     def break_now(self, weakness: Weakness, why: str) -> None:
         """Break now what a program outside lets go."""
+        self._run.record_samples()  # of ends as they were until now
         self.all = (*self.all, weakness)
         self._break(len(self.all) - 1, why)
         self._renew()
@@ -242,14 +238,14 @@ class Failures(Part):
         """What broke."""
         return {"broken": [*self.broken]}
 
-    def restore_joints(self, saved: Mapping[str, Any]) -> bool:
+    def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Be as after what broke in an earlier part of the run.  ValueError: nothing of the kind may break."""
         broken = saved["broken"]
         if not isinstance(broken, list) or len(set(broken)) < len(broken):
             raise ValueError("broken: numbers of what has broken were expected")
         if not all(isinstance(k, int) and 0 <= k < len(self.all) for k in broken):
             raise ValueError("broken: numbers of what may break were expected")
-        for k in broken:
+        for k in (k for k in broken if k not in self.broken):
             self._part(k)
         return False  # each has been given a solver
 
@@ -261,8 +257,8 @@ class Failures(Part):
         run, x = self._run, self.all[k]
         line, end = x.ends[0]
         run.output_due()
-        for part in run.parts:
-            part.let_go(x.ends)
+        for l, e in x.ends:
+            run.lines[l].let_go(e, run.t, run.model.models[l], run.state.lines[l])
         before, states, energy = run.model.models, run.state.lines, 0.0
         self._part(k)
         for l, e in x.ends:
@@ -282,8 +278,9 @@ class Failures(Part):
         self.broken.append(k)
         for line, model in zip(run.lines, run.model.models, strict=True):
             line.use_model(model)
-        for part in run.parts:
-            part.release(self.all[k].ends)
+        for l, e in self.all[k].ends:
+            if (zones := run.lines[l].zones) is not None:
+                zones.release(e, run.model.models[l])
         states = [
             x if x.turn.size == 3 * len(model.line.torsion) else x._replace(turn=NO_TURN)
             for x, model in zip(run.state.lines, run.model.models, strict=True)
@@ -428,7 +425,24 @@ class Cuts(Part):
         if self._compared and tiny >= GIVE_UP:
             raise LineFailed(line.number, Outcome.COLLAPSED, run.t, s, text)
 
-    def explains(self, taken: NetworkTaken, dt: float) -> LineFailed:
+    def judge_try(self, code: int) -> bool:
+        """LineFailed: no step leads on, and nothing was given up."""
+        if code == b.FAILED:
+            raise self._explained(self._run.loop.tried, float(self._run.loop.clock.tried_dt))
+        return False
+
+    def find_accelerations(self, solve: Accelerations) -> Accelerations:
+        """LineFailed: there are none."""
+
+        def explained(lengthening: Mapping[int, Floats]) -> NetworkTaken:
+            taken = solve(lengthening)
+            if taken.outcome != Outcome.OK:
+                raise self._explained(taken, 0.0)
+            return taken
+
+        return explained
+
+    def _explained(self, taken: NetworkTaken, dt: float) -> LineFailed:
         """Why no step of dt (s) leads on; 0: why there are no accelerations."""
         run, k = self._run, taken.line
         detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"

@@ -7,7 +7,7 @@ proposes is carried out: the line has other cells then, and the network another 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,6 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, advance_zones
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Counts
-from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.mesh import Layout
@@ -78,32 +77,83 @@ def _saved_layout(layout: Layout, saved: Mapping[str, Any]) -> Layout:
 class _LineZones:
     """What moves the zones of one line, with the numbers of a compiled run (kernels.mesh.zone_step)."""
 
-    def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
+    def __init__(self, run: RunOfLines, number: int, model: Model, manager: DomainManager) -> None:
         self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager)
+        self._run = run
         self.clock, self.counts = b.Clock(), Counts()
-        longest, clock = LONGEST_IN_RAMP * manager.ramp_time * every, manager.zones.clock
+        longest, clock = LONGEST_IN_RAMP * manager.ramp_time * run.resolution.one.every, manager.zones.clock
         clock.ramp_step, clock.steady_step = longest, longest * READY
         clock.letting_go = LETTING_GO * manager.ramp_time
         self.pending: Change | None = None
         self.paid: PaidZones | None = None  # of a line that is paid out
         self.cells: CellChanges | None = None  # what changes its cells in arrays of their own
 
-    def do_phase(self, run: RunOfLines, phase: int, t: float, end: float, old: State, new: State) -> None:
+    def do_phase(self, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
         self.counts.phase, self.clock.now, self.clock.try_end = phase, t, end
-        advance_zones(self._bind(run, old, new, self.clock, self.counts, review=0).numbers)
+        advance_zones(self._bind(old, new, self.clock, self.counts, review=0).numbers)
 
-    def bind(self, run: RunOfLines, loop: NetworkSteps) -> Table:
+    @property
+    def remeshes(self) -> bool:
+        """Whether cells follow the curvature: nodes come and go."""
+        return bool(self.switching.zones.clock.share > 0.0)
+
+    def switch(self, change: Change, here: NDArray[np.bool_] | None = None) -> None:
+        """Other zones, whose solver has still to follow: nothing moves, and what changes energy is booked.
+
+        here: as of `CellChanges.change_once`.
+        """
+        run, k, line = self._run, self.number, self._run.lines[self.number]
+        line.write_down()  # of the zones before, and with the reel as it is
+        if self.paid is not None:
+            run.model = run.model.with_lines({k: self.paid.as_now(run.model.models[k], run.t, run.state.lines[k])})
+        at, risen = run.model.models[k].line.s, run.state.lines[k].T - line.books.tension[0]
+        model, state, books, booked = CellChanges(run, k, self.switching, once=True).change_once(change, here)
+        if self.paid is not None:
+            self.paid.paying.fit(model, run.t)
+        states = [*run.state.lines]
+        states[k] = state
+        run.model, run.state = run.model.with_lines({k: model}), run.state._replace(lines=states)
+        line.use_cells(model, books)
+        if self.paid is not None:  # a node that comes or goes now asks for rates of tensions, as of the old cells
+            middle, old = (0.5 * (s[:-1] + s[1:]) for s in (model.line.s, at))
+            line.books.tension[0] = state.T - np.interp(middle, old, risen)
+        line.books.work[0, b.ZONES] += booked
+        note_change(line.events, self.switching.manager, run.t, change, booked)
+
+    def change_line(self, change: Callable[[Line], Line]) -> None:
+        """The line is changed on the same cells: it touches itself from now on, or no longer."""
+        self.full = replace(self.full, line=change(self.full.line))
+        model = self.switching.model
+        self.switching.model = replace(model, line=change(model.line))
+
+    def release(self, end: int, model: Model) -> None:
+        """An end, 0 or 1, has come loose: nothing holds its direction and its twist any longer."""
+        self.switching.release(end, model)
+        self._use_full(model)
+
+    def use_loads(self, model: Model) -> None:
+        """Go on with a model whose loads and motions are others on the same cells."""
+        self._use_full(model)
+        self.switching.model = model
+        self.switching.manager.load(model.ends.moments)
+
+    def _use_full(self, model: Model) -> None:
+        """Other loads, or other ends, on the cells that the line began with; those of one at a winch change."""
+        if self.paid is None:
+            self.full = on_layout(model, self.full.zoned)
+
+    def bind(self, loop: NetworkSteps) -> Table:
         """What follows the zones within the compiled steps of a loop."""
         even, odd = (turn.lines[self.number] for turn in loop.turns)
-        self._bind(run, even, odd, loop.clock, loop.counts)
+        self._bind(even, odd, loop.clock, loop.counts)
         self.switching.let_review()
         return self.switching.table
 
-    def _bind(self, run: RunOfLines, old: State, new: State, clock: b.Clock, counts: Counts, **more: int) -> Table:
+    def _bind(self, old: State, new: State, clock: b.Clock, counts: Counts, **more: int) -> Table:
         switching, model = self.switching, self.switching.model
         switching.table.bind(line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, **more)
-        switching.table.bind(clock=clock, counts=counts, work=run.lines[self.number].books.work)
+        switching.table.bind(clock=clock, counts=counts, work=self._run.lines[self.number].books.work)
         switching.table.bind(zones=switching.zones, near=switching.manager.near)
         return switching.table
 
@@ -118,13 +168,10 @@ class RunZones(Part):
     name, is_of_form = "zones", True  # which follow every step
 
     def __init__(self, run: RunOfLines, managers: Mapping[int, DomainManager], payout: RunPayout | None = None) -> None:
-        every = run.resolution.one.every
-        self._run = run
-        # (L,) J, of each line with itself and others, after the last accepted step
-        self._contact_energy = np.zeros(len(run.lines))
-        self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
-        for k, x in managers.items():
-            run.lines[k].manager = x
+        self._run, run.contact_energy = run, np.zeros(len(run.lines))
+        self.lines = [_LineZones(run, k, run.model.models[k], x) for k, x in managers.items()]
+        for x in self.lines:
+            run.lines[x.number].manager, run.lines[x.number].zones = x.switching.manager, x
         if payout is not None:
             self._pay(payout)
         self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
@@ -151,7 +198,7 @@ class RunZones(Part):
             loop.counts.asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
             return
         loop.hold_zones([x.switching.table for x in self.lines])
-        loop.bind_zones([x.bind(run, loop) for x in self.lines])
+        loop.bind_zones([x.bind(loop) for x in self.lines])
         mine = [run.lines[x.number] for x in self.lines]
         if run.solver.shared is not None or any(x.contact is not None for x in mine):
             loop.counts.asks |= b.ASK_STEPS
@@ -176,12 +223,6 @@ class RunZones(Part):
             run.lines[x.number].cells = x.cells = CellChanges(run, x.number, x.switching)
             x.cells.adopt()
 
-    def sync(self) -> None:
-        """Python knows of the cells of now."""
-        for x in self.lines:
-            if x.cells is not None:
-                x.cells.sync()
-
     def use_solver(self, model: NetworkModel, solver: NetworkSolver) -> None:
         """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
         run = self._run
@@ -194,17 +235,9 @@ class RunZones(Part):
                 near[x.number] = contact.watch_nearness(horizons[x.number])
             x.switching.manager.near = near.get(x.number, np.zeros(0))
 
-    def contact_before(self) -> NDArray[np.float64]:
-        """Of the last state that steps have led to."""
-        return self._contact_energy
-
-    def note_forces(self) -> None:
-        """Energy of contact of the state as it is, from which that of other cells is told, of all lines."""
-        self._contact_energy[:] = [work.report[SELF_CONTACT_ENERGY] for work in self._run.solver.work]
-
     def begin(self) -> None:
         """Weigh the criteria of the first state."""
-        self.note_forces()
+        self._run.note_contact()
         for x in self.lines:
             x.switching.begin(self._ends(x), self._run.state.lines[x.number])
             if x.switching.manager.held:
@@ -213,11 +246,6 @@ class RunZones(Part):
 
     def _ends(self, x: _LineZones) -> Ends:
         return self._run.model.models[x.number].ends.at_time(self._run.t)
-
-    @property
-    def remeshes(self) -> bool:
-        """Whether cells of a line follow the curvature: its nodes come and go."""
-        return any(x.switching.zones.clock.share > 0.0 for x in self.lines)
 
     @property
     def longest(self) -> float:
@@ -251,7 +279,7 @@ class RunZones(Part):
                 x["switching"] = zoning_of_today(x["switching"])
         return {"zones": found}
 
-    def restore_cells(self, saved: Mapping[str, Any]) -> bool:
+    def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Give lines the zones of a checkpoint, in which nothing is under way yet.  ValueError: they are none of them.
 
         Contact with itself is that of the model of the run.
@@ -279,17 +307,19 @@ class RunZones(Part):
             x.switching.restore(saved["zones"][line.name]["switching"])
             if line.books.strains.size:  # outputs within the next step begin with the stiffness of now
                 line.books.strains[:, b.BENDS] = x.switching.model.line.kb[:, 0]
-        self.note_forces()
+        self._run.note_contact()
 
     # --- steps ------------------------------------------------------------------------------------
 
-    def prepare(self, end: float) -> None:
-        """Lengths and stiffness as they will be then."""
-        run = self._run
-        for x in self.lines if not self._compiled else ():
-            x.do_phase(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
+    def judge_try(self, code: int) -> bool:
+        """Lines are as at the end of a try; after it those that need more rod get it."""
+        run, end = self._run, float(self._run.loop.clock.try_end)
+        if code == b.TRYING:
+            for x in self.lines if not self._compiled else ():
+                x.do_phase(b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
+        return code == b.TRIED and self._rescue()
 
-    def wants_retry(self) -> bool:
+    def _rescue(self) -> bool:
         """Whether lines have got more rod, with which the step is to be repeated."""
         run, changes, step = self._run, list[tuple[_LineZones, Change]](), int(self._run.loop.counts.steps)
         taken, clock = run.loop.tried, run.loop.clock
@@ -303,7 +333,7 @@ class RunZones(Part):
             if taken.outcome != Outcome.OK and taken.line not in (k, -1):
                 continue
             if taken.outcome == Outcome.OK and not self._compiled:
-                x.do_phase(run, b.JUDGE, run.t, end, old, new)
+                x.do_phase(b.JUDGE, run.t, end, old, new)
             change = x.switching.rescue(taken, end, new, self._rescues)
             if change is None and last:
                 change = x.switching.all_rod(taken)
@@ -316,13 +346,13 @@ class RunZones(Part):
     def note_step(self) -> None:
         """With the states exchanged: energy, and what should change."""
         run = self._run
-        self.note_forces()
+        run.note_contact()
         for x in self.lines:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
             if not self._compiled:
                 x.clock.last_dt, x.clock.last_rho = run.last_step, run.last_rho
-                x.do_phase(run, b.END_STEP, run.t, run.t, state, before)
+                x.do_phase(b.END_STEP, run.t, run.t, state, before)
             x.pending = x.switching.book_step(run.t, state)
 
     def after_step(self) -> None:
@@ -348,64 +378,6 @@ class RunZones(Part):
             x.cells.sync()
             note_change(run.lines[x.number].events, x.switching.manager, run.t, change, booked)
         for x, change in rest:
-            self._change_once(x, change)
+            x.switch(change)
         if rest:
             run.go_on_changed((), AFTER_CHANGE)
-
-    def switch_zones(self, number: int, change: Change, here: np.ndarray | None) -> None:
-        """Give a line other zones, whose solver has still to follow; here: as of `CellChanges.change_once`."""
-        self._change_once(next(x for x in self.lines if x.number == number), change, here)
-
-    def _change_once(self, x: _LineZones, change: Change, here: np.ndarray | None = None) -> None:
-        """Give a line other zones: nothing moves, and what changes energy is booked."""
-        run, k, line = self._run, x.number, self._run.lines[x.number]
-        line.write_down()  # of the zones before, and with the reel as it is
-        if x.paid is not None:
-            run.model = run.model.with_lines({k: x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])})
-        at, risen = run.model.models[k].line.s, run.state.lines[k].T - line.books.tension[0]
-        model, state, books, booked = CellChanges(run, k, x.switching, once=True).change_once(change, here)
-        if x.paid is not None:
-            x.paid.paying.fit(model, run.t)
-        states = [*run.state.lines]
-        states[k] = state
-        run.model, run.state = run.model.with_lines({k: model}), run.state._replace(lines=states)
-        line.use_cells(model, books)
-        if x.paid is not None:  # a node that enters or leaves now asks for the rates of tensions, as of the old cells
-            middle, old = (0.5 * (s[:-1] + s[1:]) for s in (model.line.s, at))
-            line.books.tension[0] = state.T - np.interp(middle, old, risen)
-        line.books.work[0, b.ZONES] += booked
-        note_change(line.events, x.switching.manager, run.t, change, booked)
-
-    def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
-        """The line of this number is changed, if its zones move: it touches itself from now on, or no longer."""
-        for x in (x for x in self.lines if x.number == number):
-            x.full = replace(x.full, line=change(x.full.line))
-            model = x.switching.model
-            x.switching.model = replace(model, line=change(model.line))
-
-    def release(self, ends: Iterable[tuple[int, int]]) -> None:
-        """Ends (line, 0 or 1) have come loose: nothing holds their direction and their twist any longer."""
-        for x in self.lines:
-            for k in (k for number, k in ends if number == x.number):
-                model = self._run.model.models[x.number]
-                x.switching.release(k, model)
-                self._use_full(x, model)
-
-    def change_loads(self) -> None:
-        """Go on with the models of the run, whose loads and motions are others on the same cells."""
-        for x in self.lines:
-            model = self._run.model.models[x.number]
-            self._use_full(x, model)
-            x.switching.model = model
-            x.switching.manager.load(model.ends.moments)
-
-    @staticmethod
-    def _use_full(x: _LineZones, model: Model) -> None:
-        """Other loads, or other ends, of the line on the cells that it began with; those of one at a winch change."""
-        if x.paid is None:
-            x.full = on_layout(model, x.full.zoned)
-
-    @property
-    def changed(self) -> Collection[int]:
-        """Of the lines whose zones move."""
-        return [x.number for x in self.lines]

@@ -315,7 +315,7 @@ def bring_back(run: Run, saved: Saved) -> None:
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
         recorder.back_to(mark)
     # Something has broken since, or contact has begun, or zones or lengths have changed, or what changes is under way.
-    moving = {k for part in run.parts for k in part.changed}
+    moving = {line.number for line in run.lines if line.changes_cells}
     if run.model is not saved.model or moving:
         run.model = saved.model
         for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
@@ -323,7 +323,7 @@ def bring_back(run: Run, saved: Saved) -> None:
             if k not in moving:
                 line.use_model(model)
         for part in reversed(run.parts):
-            part.restore_cells(saved.run)
+            part.restore_lines(saved.run)
         if moving:
             run.renew_other()
         run.make_solver()

@@ -148,7 +148,7 @@ class SteppedPoints(SettableObstacles):
             raise ValueError(f"{self._key_of(name)} is not held: there is nothing to release")
         weakness = Weakness(f"point {name} gives way", ends, math.inf, math.inf, False)
         try:
-            self._run.release(weakness, "by Simulation.release")
+            self._run.let_go(weakness, "by Simulation.release")
         except LineFailed as failed:
             raise self._fail(failed) from None
         self._forget_released()

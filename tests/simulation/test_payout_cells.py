@@ -39,7 +39,7 @@ def change_cells(line: OnlyLine, random: np.random.Generator, part: float) -> No
             here[[a, b]] = True
             if b - a > 1 and random.random() < part:
                 cells += [(a, (a + b) // 2), ((a + b) // 2, b)]
-    line.zones_of_all.switch_zones(0, line.zones.switching.manager.same_zones(), here)
+    line.zones.switch(line.zones.switching.manager.same_zones(), here)
     line.run.go_on_changed((), "where cells change")
 
 

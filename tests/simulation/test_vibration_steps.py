@@ -49,7 +49,7 @@ def watched(scene=None):
     resolution, clock = first_resolution(scene), b.Clock()
     clock.largest = clock.next_dt = resolution.step
     steps = VibrationSteps(scene, resolution)
-    VibrationsOfLines({"line": steps}, clock).at_stop()
+    VibrationsOfLines({"line": steps}, clock).begin_leg()
     return resolution, clock, steps
 
 
@@ -60,7 +60,7 @@ def look(steps, clock, amplitude):
     steps.log(np.column_stack([t, np.full_like(t, 50.0), force]))
     found = steps.amplitude()
     clock.now = steps.look
-    VibrationsOfLines({"line": steps}, clock).at_due()
+    VibrationsOfLines({"line": steps}, clock).begin_leg()
     return found
 
 
@@ -78,7 +78,7 @@ def test_steps_are_short_until_a_period_of_the_motion_has_shown_little():
     assert clock.largest == resolution.step and steps.begins == [0.0, 1.0]
     assert look(steps, clock, 20.0) == pytest.approx(20.0, rel=0.05)
     clock.now = 1.0
-    VibrationsOfLines({"line": steps}, clock).at_stop()  # the ramp ends
+    VibrationsOfLines({"line": steps}, clock).begin_leg()  # the ramp ends
     seen = 0.0
     while steps.look < np.inf:
         assert clock.largest == resolution.step
