@@ -214,6 +214,17 @@ def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any
     assert same(begun, result, ("position",)) > 1e-3
 
 
+def test_lines_that_have_met_after_what_was_saved_have_not_met(begun: Any) -> None:
+    met = next(e.t for e in begun.events if e.kind == "lines touch")
+    with hybrid.Simulation(unasked()) as run:
+        run.advance(0.2)
+        saved = run.save()
+        while run.t < met:  # so that the last step is that in which they do
+            run.step()
+        run.restore(saved)
+        assert not {BEGINS, "lines touch"} & {*kinds(run.result())}
+
+
 def test_a_line_that_parts_from_itself_as_it_comes_near_another_one_stays_in_contact(begun: Any) -> None:
     with hybrid.Simulation(unasked()) as run:
         run.advance(0.5)
