@@ -168,7 +168,6 @@ class Model:
     start_shape: str  # what it is, for people
     other_starts: tuple[tuple[str, State], ...]  # for a search of equilibrium that fails from the first
     contents: tuple[Entry, ...]
-    length: float  # m
     tension_scale: float  # N
     slack_floor: float  # N, tension at or below which a catenary cell is slack
     slack: Literal["stop", "warn"]
@@ -181,6 +180,11 @@ class Model:
     kept_in: Floats | None = None  # (3,) normal of the plane that it must not leave, though it is computed in space
     payout: PayoutPlan | None = None  # of a line that is paid out or taken in
     held: Line | None = None  # the line as its ends held it before the first of them was let go
+
+    @property
+    def length(self) -> float:
+        """Length, m, without stretch, of what is out now."""
+        return float(self.line.s[-1] - self.line.s[0])
 
     @property
     def zoned(self) -> Layout:
@@ -348,7 +352,6 @@ def build(
         start_shape=shape_name,
         other_starts=tuple(others),
         contents=contents_of(scene, line, zones, flat),
-        length=float(s[-1]),
         tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),

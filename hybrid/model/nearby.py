@@ -89,7 +89,7 @@ def nearby(
             ends = end_conditions(scene, (axes[0], axes[1]), chords, sea)
     cells: dict[str, Any] = {"line": line, "zones": zones, "cable": cable, "layout": layout, "on_base": on_base}
     cells |= {"attached": tuple(cable.at.tolist()), "inextensible": not line.ck.any()}
-    return replace(model, ends=ends, sea=sea, length=float(line.s[-1]), **cells)
+    return replace(model, ends=ends, sea=sea, **cells)
 
 
 def _held_axes(model: Model, of: LineScene, scene: LineScene, line: Line, cable: Material) -> Floats:

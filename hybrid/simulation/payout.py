@@ -79,7 +79,7 @@ class PayingOut:
             (on_base, line), zones = plan.line_on(layout, model.line, cable), layout.zones
         cells = line.h.size
         sea = model.sea if cells == model.cells else model.sea.on(cells)
-        return replace(model, line=line, zones=zones, sea=sea, length=length, layout=layout, on_base=on_base)
+        return replace(model, line=line, zones=zones, sea=sea, layout=layout, on_base=on_base)
 
     def end(self, state: State, t: float, model: Model) -> float:
         """The end at the winch is let go at t (s): what is out goes on as it moves (state), and no more comes.
@@ -267,10 +267,9 @@ class PayingOut:
     def as_now(self, model: Model) -> Model:
         """A model whose zones move, and whose nodes are where they are now."""
         self.lengthen()
-        length = self.length
-        layout = self.plan.layout(self.count, length, model.zoned.rod, model.zoned.here)
+        layout = self.plan.layout(self.count, self.length, model.zoned.rod, model.zoned.here)
         on_base = LineOnBase(self.plan.held_as(model.cable), layout.base)
-        return replace(model, layout=layout, on_base=on_base, zones=layout.zones, length=length)
+        return replace(model, layout=layout, on_base=on_base, zones=layout.zones)
 
     def release(self, cells: np.ndarray) -> None:
         """The reel no longer says how long these cells (k,), counted from the far end, are."""

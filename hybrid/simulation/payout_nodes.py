@@ -176,11 +176,10 @@ class NodeChanges(Remesh):
         copy_fields(self._paying.reel, self._reel(0, n), SHARED)
 
     def _model_of(self, line: Line, sea: Sea) -> Model:
-        model, paying, length = self.model, self._paying, float(line.s[-1] - line.s[0])
-        paying.use_reel(self._reel(self.side, self.cells), self._layout)
-        zones = paying.plan.zones_of(length) if self._layout is None else self._layout.zones
-        model = replace(model, line=line, zones=zones, sea=model.sea.with_values(sea), length=length)
-        return replace(model, layout=self._layout, on_base=self._on_base)
+        paying, layout, sea_now = self._paying, self._layout, self.model.sea.with_values(sea)
+        paying.use_reel(self._reel(self.side, self.cells), layout)
+        model = replace(self.model, line=line, sea=sea_now, layout=layout, on_base=self._on_base)
+        return replace(model, zones=paying.plan.zones_of(model.length) if layout is None else layout.zones)
 
     # --- outputs that wait --------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import resumed
 from test_plane import storm, swinging
 from test_system_contact import CLOSER, HOSE, LOW, RUBS
 from test_winch import floating
@@ -334,6 +335,19 @@ def test_it_is_resumed_bit_for_bit(flat: list[list[int]], tmp_path: Path) -> Non
         found = hybrid.resume(tmp_path / "part.h5", until=until)
     for key in ("position", "tension", "envelope/tension_max", "work/end"):
         np.testing.assert_array_equal(found.lines["cable"][key], whole.lines["cable"][key], err_msg=key)
+
+
+def test_a_line_that_is_paid_out_leaves_its_plane_in_a_resumed_run_as_in_the_whole(tmp_path: Path) -> None:
+    """By a push that is a part of what is out then, wherever the run was resumed."""
+    heave = {"heave": {"amplitude": 3.0, "period": 3.75}, "ramp": 4}
+    winch = pinned_at(0, 0, 0, motion=heave, payout={"rate": 0.02, "ramp": 2.0, "longest": 22})
+    tables = cable_scene(
+        {"length": 20, "mass": 2, "axial_stiffness": 1e6, "bending_stiffness": 1}, "free", winch, model="rod", mesh=10,
+        time=(46, 0.05), output=0.5
+    )  # fmt: skip
+    whole = resumed(tables, tmp_path, 40.0)
+    (event,) = (e for e in whole.events if e.kind == "out of plane")
+    assert 40.0 < event.t < 46.0 and np.abs(whole.position[-1, :, 1]).max() > 1e-5
 
 
 def test_stepped_from_outside_it_is_computed_in_the_plane_that_a_scene_asks_for(flat: list[list[int]]) -> None:

@@ -238,13 +238,13 @@ def test_runs_to_compare_with_have_it() -> None:
 
 
 class Saying(hybrid.RunPart):
-    """Notes of the whole run at every half second."""
+    """Notes of the whole run at every half second, with the length by which its parts judge."""
 
     name = "saying"
 
     def after_step(self, run: hybrid.RunView) -> None:
         if abs(run.t - round(2.0 * run.t) / 2.0) < 1e-9:
-            run.note("so far")
+            run.note("so far", value=run._run.model.models[0].length)
 
 
 def test_a_note_of_the_whole_run_is_of_all_that_is_out_then(tmp_path: Path) -> None:
@@ -254,7 +254,9 @@ def test_a_note_of_the_whole_run_is_of_all_that_is_out_then(tmp_path: Path) -> N
     hybrid.run(scene | {"time": scene["time"] | {"duration": 2.3}}, tmp_path / "part.h5", parts=[Saying()]).close()
     hybrid.resume(tmp_path / "part.h5", until=4.0, parts=[Saying()]).close()
     assert not (apart := differences(tmp_path / "whole.h5", tmp_path / "part.h5")), apart
-    spans = {round(e.t, 9): e.s_b for e in of_kind(whole, "part saying")}
+    notes = of_kind(whole, "part saying")
+    assert [e.value for e in notes] == [e.s_b for e in notes]
+    spans = {round(e.t, 9): e.s_b for e in notes}
     known = dict(zip(whole.times.round(9).tolist(), out(whole).tolist(), strict=True))
     assert len(spans) == 8 and all(s == pytest.approx(known[t], abs=1e-9) for t, s in spans.items())
 
