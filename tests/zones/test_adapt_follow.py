@@ -23,7 +23,7 @@ from hybrid.scene.read import one_line
 from hybrid.simulation import cell_changes, zones_at_rest
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.restart import zoning_of_today
-from hybrid.simulation.run_zones import RunZones
+from hybrid.simulation.run_zones import _LineZones
 from hybrid.solve.network_steps import NetworkSteps
 from hybrid.zones.manager import Allowed, DomainManager, Times, shares_asked
 from tests.inside import calls_of, never_due
@@ -170,7 +170,7 @@ def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatc
         model={"kind": "adaptive", "curvature_error": 0.03}, output={"every": 2, "points": 501, "errors": False}
     ))  # fmt: skip
     changed = calls_of(
-        monkeypatch, RunZones, "_change_once", lambda x, _, how, *__: how.same and x._run.lines[0].envelope.itself.on
+        monkeypatch, _LineZones, "switch", lambda x, how, *_: how.same and x._run.lines[0].envelope.itself.on
     )
     once = hybrid.run(scene)
     by_python = sum(changed)

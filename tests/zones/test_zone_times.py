@@ -85,7 +85,8 @@ def test_rods_whose_cells_follow_are_never_let_go_unless_that_is_asked() -> None
 def test_steps_while_bending_comes_and_goes() -> None:
     """A tenth of the ramp time; twice that before; lengths are let go within a ramp time."""
     built, found = managed()
-    clock = run_zones._LineZones(0, built, found, 1).switching.zones.clock
+    run: Any = SimpleNamespace(resolution=SimpleNamespace(one=SimpleNamespace(every=1)))
+    clock = run_zones._LineZones(run, 0, built, found).switching.zones.clock
     assert clock.ramp_step == pytest.approx(0.1 * found.ramp_time)
     assert clock.steady_step == pytest.approx(0.2 * found.ramp_time)
     assert clock.letting_go == pytest.approx(found.ramp_time)
