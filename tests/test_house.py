@@ -406,6 +406,23 @@ def test_only_the_command_line_prints() -> None:
     assert not found
 
 
+# Verbs by which a run asks its parts, at most.
+MOST_VERBS = 19
+
+
+def test_what_one_part_alone_needs_is_no_verb_of_all() -> None:
+    trees = {x: ast.parse(x.read_text(encoding="utf-8")) for x in FILES if room(x) == "simulation"}
+    classes = [(x.stem, y) for x, tree in trees.items() for y in tree.body if isinstance(y, ast.ClassDef)]
+    verbs = {
+        y.name: [z.name for z in y.body if isinstance(z, ast.FunctionDef)]
+        for file, y in classes
+        if (file, y.name) == ("parts", "Part") or "Part" in [getattr(z, "id", "") for z in y.bases]
+    }
+    of_all = verbs.pop("Part")
+    assert 0 < len(of_all) <= MOST_VERBS
+    assert not [x for x in of_all if sum(x in own for own in verbs.values()) < 2]
+
+
 # Arguments of a function, at most; those of a command of the command line are its options.
 MOST_ARGUMENTS = 10
 # Functions with more, as "file name", and why a record would not do.

@@ -25,7 +25,7 @@ ORDER = (
     "planes",  # a line goes on in space, or in its plane, before anything changes its cells
     "lines",  # what makes going on senseless ends the run before more is changed
     "contact",  # begins and ends on the cells on which lines were seen to be near
-    "cuts",  # their text says what touches now
+    "cuts",  # no step leads on where contact gives nothing up, and their text says what touches now
     "zones",  # before nodes, which enter and leave beside the cells that a line has
     "payout",  # before what breaks: a winch may come to its end in the step that breaks its line
     "failures",  # last of what changes lines: what comes loose does so from all of them as they are
@@ -106,7 +106,7 @@ class Part:
 
     @property
     def due(self) -> float:
-        """When steps are to stop next (s) beside `stops`; infinity: nothing is due."""
+        """When steps are to stop next (s), beside `stops`; infinity: nothing is due."""
         return inf
 
     def begin_leg(self) -> None:

@@ -350,7 +350,7 @@ class Run(RecordedRun):
         """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
         self._go_back(True)
         try:
-            any(judge(b.FAILED) for judge in self.parts.judge_try)  # the last raises where none before gives in
+            any(judge(b.FAILED) for judge in self.parts.judge_try)  # `Cuts` raises where nothing is given up before
         except LineFailed:
             if not self.stepped_outside:  # else the step may be taken back
                 self._record_last()
