@@ -193,7 +193,6 @@ class RunContact(Part):
 
     def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Lines touch themselves and each other, and know their partners again."""
-        self.shared = self.watch = None  # what has met since has not
         near = [x.number for x in self._run.lines if "self_contact" in of_line(saved, x.name) and not x.touches]
         self._let_touch(near)
         among, between = self._run.model.touching, _pairs(saved["between"])

@@ -311,6 +311,7 @@ def kept(run: Run) -> dict[str, Any]:
 
 def bring_back(run: Run, saved: Saved) -> None:
     """Be as when `kept` was called; ends that are set from outside must be on their paths of then."""
+    run.write_log()  # parts have seen all steps, and what they say of them is taken back
     run.gather_events()
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
         recorder.back_to(mark)
