@@ -214,6 +214,10 @@ def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any
     assert same(begun, result, ("position",)) > 1e-3
 
 
+def test_lines_that_are_asked_to_touch_are_resumed_bit_for_bit(tmp_path: Path) -> None:
+    assert kinds(resumed(lowered(0.5), tmp_path, 0.3, 0.4)).count("lines touch") == 1
+
+
 def test_lines_that_have_met_after_what_was_saved_have_not_met(begun: Any) -> None:
     met = next(e.t for e in begun.events if e.kind == "lines touch")
     with hybrid.Simulation(unasked()) as run:
