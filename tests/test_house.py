@@ -407,7 +407,7 @@ def test_only_the_command_line_prints() -> None:
 
 
 # Verbs by which a run asks its parts, at most.
-MOST_VERBS = 19
+MOST_VERBS = 18
 
 
 def test_what_one_part_alone_needs_is_no_verb_of_all() -> None:

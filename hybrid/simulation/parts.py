@@ -72,7 +72,6 @@ class Part:
     """A capability of a run, by the verbs that its loop has for all of them; here none does anything."""
 
     name = ""  # its place in ORDER
-    is_of_form = False  # whether what it keeps in a checkpoint has the form of what it would keep now
     older: Mapping[str, Any] = MappingProxyType({})  # what it keeps that files of earlier programs may lack, as it was
     wants = EVERY_STEP  # the bits of a step (kernels.state.books) of which it must hear
 
@@ -146,14 +145,11 @@ class Part:
         """What is to be said of the whole run, of which this is the status, before its file is closed."""
 
     # --- checkpoints: parts go on in the opposite order, as each has found lines as those before it left them ----
+    # What a file has of a part is checked by the part alone.
 
     def checkpoint(self) -> dict[str, Any]:
         """What it keeps between two steps, by names in the checkpoint of the run."""
         return {}
-
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """Of a checkpoint, what it keeps, with what files of earlier programs do not have."""
-        return {name: saved.get(name, x) for name, x in self.older.items()}
 
     def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Lines of the scene become those of a checkpoint; whether a solver has to follow.

@@ -168,12 +168,14 @@ def _renamed(saved: dict[str, Any]) -> dict[str, Any]:
     return {OLDER_NAMES.get(name, name): x for name, x in saved.items()}
 
 
-def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
+def zoning_of_today(saved: Any) -> Any:
     """The zones of a checkpoint, also of an older version.
 
     Those had no cells that follow, one largest curvature, no velocities, nothing of kinks, other names, or fewer
     criteria: those that came later begin with nothing.
     """
+    if not isinstance(saved, dict):
+        return saved
     saved = {"following": None} | saved
     following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
     if isinstance(following, dict) and isinstance(following.get("peak"), float):

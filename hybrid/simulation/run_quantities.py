@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,7 @@ from hybrid.solve.contact import SharedContact
 from hybrid.solve.network_solver import NetworkSolver
 from hybrid.store.format import Field
 from hybrid.store.hdf5_file import group_of
+from hybrid.store.integrity import matched
 
 
 def idle_ends(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
@@ -56,7 +58,7 @@ def idle_ends(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
 class RunQuantities(Part):
     """The quantities of all lines, each computed from a state of its line."""
 
-    name, is_of_form = "quantities", True
+    name, older = "quantities", MappingProxyType({"quantities": {}})
 
     def __init__(self, network: Network, scenes: Mapping[str, LineScene]) -> None:
         """scenes: of the lines whose quantities are kept here, by name; others keep them themselves."""
@@ -129,21 +131,22 @@ class RunQuantities(Part):
         found |= {f"{line}/turns": x.turns for line, (x, _) in self._of_line.items()}
         return {name: x.copy() for name, x in found.items() if x.size}
 
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """In files of earlier programs there are no ranges, or no references: these are unknown."""
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on with ranges that a checkpoint has.
+
+        In files of earlier programs there are no ranges, or no references: these are unknown.
+        """
         for x in self._steps.values():
             x.restore(None)
-        mine = saved["quantities"] if "quantities" in saved else self.checkpoint()["quantities"]
-        return {"quantities": self._references() | mine if isinstance(mine, dict) else mine}
-
-    def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on with ranges that a checkpoint has; of one from before there were any, they stay unknown."""
-        saved = saved["quantities"]
+        mine = saved["quantities"]
+        if mine != {}:
+            mine = self._references() | mine if isinstance(mine, dict) else mine
+            matched(mine, self.checkpoint()["quantities"], "quantities")
         for name, x in self._steps.items():
-            x.restore(saved.get(name))
+            x.restore(mine.get(name))
         for line, (found, _) in self._of_line.items():
-            found.first[:] = saved.get(f"{line}/first", found.first)
-            found.turns[:] = saved.get(f"{line}/turns", found.turns)
+            found.first[:] = mine.get(f"{line}/first", found.first)
+            found.turns[:] = mine.get(f"{line}/turns", found.turns)
 
     @property
     def fields(self) -> list[Field]:
@@ -186,7 +189,7 @@ class RunQuantities(Part):
 class Rotations(Part):
     """Roll, pitch and yaw of bodies and points that go on from output to output, beyond half a turn."""
 
-    name, is_of_form = "rotations", True
+    name = "rotations"
 
     def __init__(self, network: Network, model: NetworkModel) -> None:
         """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
@@ -204,7 +207,7 @@ class Rotations(Part):
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on from there."""
-        self.last[:] = saved["rotations"]
+        self.last[:] = matched(saved["rotations"], self.last, "rotations")
 
     def unwind(self, values: dict[str, Floats]) -> None:
         """Put in place of the rotations (nb, 3) in `values` the same ones, deg, each nearest to the one before it."""

@@ -429,7 +429,7 @@ def restore(run: RecordedRun, saved: Mapping[str, Any]) -> None:
         run.make_solver()
     template = checkpoint(run) | {"control": None, "planes": None}
     for part in run.parts:
-        template |= dict.fromkeys(() if part.is_of_form else part.checkpoint())
+        template |= dict.fromkeys(part.checkpoint())
     saved["lines"] = lines_of_today(saved.get("lines"), template["lines"], saved["rho"])
     for line in template["lines"].values():
         line["envelope"] = None  # of other meshes as well, and of files of 0.6
@@ -461,10 +461,9 @@ def _of_today(run: RecordedRun, saved: Mapping[str, Any]) -> dict[str, Any]:
     older: dict[str, Any] = {"rest": run.rest, "control": [], "cuts": run.loop.cuts(), "interval": 0.0}
     older |= {"rho": run.network.require_time().rho_inf, "worked": run.loop.worked[1, :, :SPRING]}
     older |= {"bodies": run.state.bodies, "body_work": run.solver.body_work[:, :SPRING], **WITHOUT}
-    found = older | dict(saved)
     for part in run.parts:
-        found |= part.of_today(saved)
-    return found
+        older |= part.older
+    return older | dict(saved)
 
 
 def lines_of_today(lines: Any, template: Mapping[str, Any], rho: float) -> Any:

@@ -165,7 +165,7 @@ class RunZones(Part):
     around every try, contact after every step, and outputs of criteria are written before the next one.
     """
 
-    name, is_of_form = "zones", True  # which follow every step
+    name = "zones"  # which follow every step
 
     def __init__(self, run: RunOfLines, managers: Mapping[int, DomainManager], payout: RunPayout | None = None) -> None:
         self._run, run.contact_energy = run, np.zeros(len(run.lines))
@@ -267,30 +267,19 @@ class RunZones(Part):
             found[name] = {"rod": layout.rod.copy(), "here": here, "switching": switching}
         return {"zones": found}
 
-    def of_today(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """Files of earlier programs do not say where there are nodes, nor all that is under way."""
-        zones = saved.get("zones", {})
-        if not (isinstance(zones, dict) and all(isinstance(x, dict) for x in zones.values())):
-            return {"zones": zones}
-        paid = {self._run.lines[x.number].name for x in self.lines if x.paid is not None}
-        found = {name: {"here": None} | x | ({"here": None} if name in paid else {}) for name, x in zones.items()}
-        for x in found.values():
-            if isinstance(x.get("switching"), dict):
-                x["switching"] = zoning_of_today(x["switching"])
-        return {"zones": found}
-
     def restore_lines(self, saved: Mapping[str, Any]) -> bool:
         """Give lines the zones of a checkpoint, in which nothing is under way yet.  ValueError: they are none of them.
 
         Contact with itself is that of the model of the run.
         """
         run = self._run
+        kept = matched(saved["zones"], {run.lines[x.number].name: None for x in self.lines}, "zones")
         models, states = dict[int, Model](), [*run.state.lines]
         for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
             k, layout, manager = x.number, x.full.zoned, x.switching.manager
-            mine = matched(
-                saved["zones"][run.lines[k].name], {"rod": layout.rod, "here": None, "switching": None}, "zones"
-            )
+            template = {"rod": layout.rod, "here": None, "switching": None}
+            mine = kept[run.lines[k].name]
+            mine = matched({"here": None} | mine if isinstance(mine, dict) else mine, template, "zones")  # none in 1.0
             model = on_layout(run.model.models[k], _saved_layout(layout, mine))
             manager.set_layout(model.zoned)
             x.switching, x.pending = ZoneSwitching(model, manager), None
@@ -304,7 +293,9 @@ class RunZones(Part):
         """Go on as `checkpoint` has written, of lines that have those zones.  ValueError: that cannot be."""
         for x in self.lines:
             line = self._run.lines[x.number]
-            x.switching.restore(saved["zones"][line.name]["switching"])
+            x.switching.manager.reset()
+            mine = zoning_of_today(saved["zones"][line.name]["switching"])
+            x.switching.restore(matched(mine, x.switching.checkpoint(), f"zones/{line.name}"))
             if line.books.strains.size:  # outputs within the next step begin with the stiffness of now
                 line.books.strains[:, b.BENDS] = x.switching.model.line.kb[:, 0]
         self._run.note_contact()

@@ -578,8 +578,9 @@ class DomainManager:
         self.ratios[:] = 0.0
 
     def reset(self) -> None:
-        """Set all ratios to zero."""
+        """Nothing is known of earlier steps: all ratios are zero, and nothing has been below or let go."""
         self.ratios[:] = self.seen[:] = 0.0
+        self.below_since[:], self.released[:] = np.inf, -np.inf
 
     def largest_ratios(self, s: Floats) -> Floats:
         """The largest ratios (criteria, places) at places s, m, since the last call."""

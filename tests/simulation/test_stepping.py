@@ -204,6 +204,19 @@ def test_what_loads_an_end_is_brought_back(model: str) -> None:
     assert np.array_equal(place(True), place(False))
 
 
+def test_a_state_of_before_cells_were_let_go_is_come_back_to() -> None:
+    """Since when cells are below their thresholds is infinite in the state of then, and known of all cells now."""
+    with hybrid.Simulation("examples/laying.yaml") as simulation:
+        saved, places, manager = simulation.save(), list[np.ndarray](), simulation._run.lines[0].manager
+        assert manager is not None
+        for _ in range(2):
+            simulation.restore(saved)
+            simulation.advance(1.0)
+            places.append(simulation.state.position)
+            manager.released[:] = manager.below_since[:] = 0.5
+    assert np.array_equal(*places)
+
+
 def test_a_load_that_has_ended_does_not_come_back() -> None:
     ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}}
     free = {"kind": "free", "moment": {"value": [0, 0.05, 0], "until": 0.3}}
