@@ -58,7 +58,7 @@ def idle_ends(network: Network, model: NetworkModel) -> list[tuple[int, int]]:
 class RunQuantities(Part):
     """The quantities of all lines, each computed from a state of its line."""
 
-    name, older = "quantities", MappingProxyType({"quantities": {}})
+    name, older = "quantities", MappingProxyType({"quantities": None})
 
     def __init__(self, network: Network, scenes: Mapping[str, LineScene]) -> None:
         """scenes: of the lines whose quantities are kept here, by name; others keep them themselves."""
@@ -138,14 +138,16 @@ class RunQuantities(Part):
         """
         for x in self._steps.values():
             x.restore(None)
-        mine = saved["quantities"]
-        if mine != {}:
-            mine = self._references() | mine if isinstance(mine, dict) else mine
-            matched(mine, self.checkpoint()["quantities"], "quantities")
+        now, mine = self.checkpoint()["quantities"], saved["quantities"]
+        if mine is None:
+            mine = now
+        elif isinstance(mine, dict):
+            mine = self._references() | mine
+        matched(mine, now, "quantities")
         for name, x in self._steps.items():
-            x.restore(mine.get(name))
+            x.restore(mine[name])
         for line, (found, _) in self._of_line.items():
-            found.first[:] = mine.get(f"{line}/first", found.first)
+            found.first[:] = mine.get(f"{line}/first", found.first)  # none, where nothing is asked that counts from it
             found.turns[:] = mine.get(f"{line}/turns", found.turns)
 
     @property

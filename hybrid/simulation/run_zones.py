@@ -275,11 +275,14 @@ class RunZones(Part):
         run = self._run
         kept = matched(saved["zones"], {run.lines[x.number].name: None for x in self.lines}, "zones")
         models, states = dict[int, Model](), [*run.state.lines]
-        for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
+        for x in self.lines:
             k, layout, manager = x.number, x.full.zoned, x.switching.manager
-            template = {"rod": layout.rod, "here": None, "switching": None}
-            mine = kept[run.lines[k].name]
-            mine = matched({"here": None} | mine if isinstance(mine, dict) else mine, template, "zones")  # none in 1.0
+            mine, template = kept[run.lines[k].name], {"rod": manager.layout.rod, "here": None, "switching": None}
+            if isinstance(mine, dict):
+                mine = {"here": None} | mine  # files of 1.0 do not say where there are nodes
+            matched(mine, template, "zones")
+            if x.paid is not None:  # its winch has given the line the cells of then
+                continue
             model = on_layout(run.model.models[k], _saved_layout(layout, mine))
             manager.set_layout(model.zoned)
             x.switching, x.pending = ZoneSwitching(model, manager), None
