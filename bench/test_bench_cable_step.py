@@ -1,4 +1,4 @@
-"""What a step of one cable costs, by cells, kind and dimension, beside another checkout of this package if one is named.
+"""What a step and a run of one cable cost, by cells, kind and dimension, beside another checkout of this package if one is named.
 
 HYBRID_OTHER=/path/to/checkout pytest bench/test_bench_cable_step.py -m bench -n 0 -s -o faulthandler_timeout=0
 
@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cable_steps import CASES
+from cable_steps import CASES, RUNS
 
 import hybrid
 
@@ -25,7 +25,7 @@ MOST = 1.03  # of the other checkout's step
 HERE = Path(hybrid.__file__).parents[1]
 
 
-class Steps:
+class Costs:
     """A process that imports `hybrid` from a checkout, and runs cases there."""
 
     def __init__(self, checkout: Path) -> None:
@@ -34,7 +34,7 @@ class Steps:
         self._process = subprocess.Popen(command, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def of(self, case: str) -> float:
-        """Microseconds a step."""
+        """Microseconds a step, or milliseconds a run."""
         assert self._process.stdin is not None and self._process.stdout is not None
         print(case, file=self._process.stdin, flush=True)
         return float(self._process.stdout.readline())
@@ -43,20 +43,26 @@ class Steps:
         self._process.communicate()
 
 
-def test_steps_of_one_cable() -> None:
+@pytest.mark.parametrize(("cases", "unit"), [(CASES, "us"), (RUNS, "ms")], ids=["steps", "runs"])
+def test_costs_of_one_cable(cases: list[str], unit: str) -> None:
     other = os.environ.get("HYBRID_OTHER")
-    places = [Steps(HERE), *([Steps(Path(other))] if other else [])]
-    over = {}
+    places = [Costs(HERE), *([Costs(Path(other))] if other else [])]
+    over, ratios = {}, []
     print()
-    for case in CASES:
+    for case in cases:
         for place in places:
             place.of(case)  # compiles, and warms caches
         least = np.min([[place.of(case) for place in places] for _ in range(ROUNDS)], axis=0)
-        line = f"{case + 'D':20} {least[0]:9.1f} us"
+        line = f"{case:20} {least[0]:9.1f} {unit}"
         if other:
-            line += f"   {least[1]:9.1f} us there, ratio {least[0] / least[1]:.3f}"
-            over |= {case: least[0] / least[1]} if least[0] > MOST * least[1] else {}
+            ratios.append(least[0] / least[1])
+            line += f"   {least[1]:9.1f} {unit} there, ratio {ratios[-1]:.3f}"
+            over |= {case: ratios[-1]} if ratios[-1] > MOST else {}
         print(line, flush=True)
     for place in places:
         place.close()
+    if other:
+        print(
+            f"{len(cases)} rows, {min(ratios):.3f} to {max(ratios):.3f}, median {np.median(ratios):.3f}, {len(over)} above {MOST}"
+        )
     assert not over

@@ -1,4 +1,4 @@
-"""Whether a cable is a network of one line: each of its scenes as both, every dataset and event, and what both cost.
+"""Whether a cable is a network of one line: each of its scenes as both, every dataset and event.
 
     pytest bench/test_bench_one_world.py -m bench -n 0 -s                       # all: an hour of one processor
     pytest bench/test_bench_one_world.py -m bench -n 0 -s -k "digests or rest"  # families: see FAMILIES
@@ -7,7 +7,7 @@
 computes scenes of the digests, of the examples and of the pairs of features, in space and with steps that end at outputs,
 and compares to 1e-9 of the scale of each dataset (tests/combinations/networks.py).  HYBRID_ONE_WORLD: part of the names
 of scenes that are to be computed.  One line a scene, then a summary; a scene that differs beyond what EXCEPTIONS allows
-fails.  `-k cost` prints a table of the processor time of a step, and of whole runs; nothing is asserted of times.
+fails.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import copy
 import os
 import signal
 import sys
-import time as clock
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -32,8 +31,6 @@ from digest_scenes import EXAMPLES, at_rest, moving
 
 import hybrid
 from hybrid.errors import ComputationError, HybridError, SceneError
-from hybrid.scene.read import as_scene
-from hybrid.scene.root import in_full
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # of the tests, where scenes are said in other ways
 from tests.combinations.networks import Difference, both, differences, events_differ
@@ -182,69 +179,3 @@ def test_cables_are_networks(family: str, monkeypatch: pytest.MonkeyPatch) -> No
         print(f"\n{family:10}{name:56}{how:18}{told}", end="", flush=True)
     print(f"\n{family}: {len(scenes)} scenes: " + ", ".join(f"{n} {how}" for how, n in went.most_common()), flush=True)
     assert not differ, f"{len(differ)} of {len(scenes)} differ: {', '.join(differ)}"
-
-
-# --- what a step, and a whole run, costs ----------------------------------------------------------
-
-CELLS = (20, 100, 400, 1000)
-FEW, MANY = 200, 1000  # steps of which the difference is measured
-AGAIN = 3  # times that each is measured: the least counts
-STEP = 0.02  # s
-SECTION = {"length": 100, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
-MODELS: dict[str, Any] = {
-    "catenary": "catenary", "rod": "rod", "zones that move": {"kind": "adaptive", "always_move": True},
-    "cells that follow": {"kind": "adaptive", "curvature_error": 0.05}, "payout": "rod",
-}  # fmt: skip
-
-
-def _heaving(kind: str, cells: int, steps: int, plane: bool) -> Data:
-    """A line in water whose end heaves, or is paid out."""
-    section = SECTION | ({} if kind == "catenary" else {"bending_stiffness": 200.0})
-    end: Data = {"kind": "pinned", "position": [80, 0, 20]}
-    moved = {"motion": {"heave": {"amplitude": 0.5, "period": 6}, "ramp": 6}}
-    end |= {"payout": {"rate": 0.2, "ramp": 1.0, "longest": 110}} if kind == "payout" else moved
-    data: Data = {
-        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]},
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}, "initial": "equilibrium",
-        "model": MODELS[kind], "time": {"duration": steps * STEP, "step": STEP},
-        "output": {"every": steps * STEP / 5}, "dimension": 2 if plane else 3,
-    }  # fmt: skip
-    return data if kind == "cells that follow" else data | {"mesh": {"cells": cells}}
-
-
-def _cpu(scene: Any, target: Path | None = None) -> float:
-    """The least processor time of a run, s."""
-    hybrid.run(scene, target).close()
-    found = []
-    for _ in range(AGAIN):
-        begin = clock.process_time()
-        hybrid.run(scene, target).close()
-        found.append(clock.process_time() - begin)
-    return min(found)
-
-
-def _costs(kind: str, cells: int, plane: bool, folder: Path) -> tuple[float, ...]:
-    """Processor time of a step, us, and of a run with its file, s, of the cable and of the network."""
-    found = []
-    for said in (as_scene, lambda data: in_full(as_scene(data))):
-        few, many = (said(_heaving(kind, cells, steps, plane)) for steps in (FEW, MANY))
-        found += [1e6 * (_cpu(many) - _cpu(few)) / (MANY - FEW), _cpu(few, folder / "run.h5")]
-    return tuple(found)
-
-
-def test_cost(tmp_path: Path) -> None:
-    print(f"\n{'':38}{'us a step':>10}{'network':>10}{'ratio':>7}{'run (s)':>10}{'network':>10}{'ratio':>7}")
-    for kind in MODELS:
-        for plane in (True, False):
-            for cells in CELLS[:1] if kind == "cells that follow" else CELLS:
-                name = f"{kind}, {cells} cells, {'plane' if plane else 'space'}"
-                if ONLY not in name:
-                    continue
-                try:
-                    with _within(10 * MOST_SECONDS):
-                        step, run, other, whole = _costs(kind, cells, plane, tmp_path)
-                except _Late:
-                    print(f"{name:38} more than {10 * MOST_SECONDS} s", flush=True)
-                    continue
-                ratios = f"{step:10.1f}{other:10.1f}{other / step:7.2f}{run:10.3f}{whole:10.3f}{whole / run:7.2f}"
-                print(f"{name:38}{ratios}", flush=True)
