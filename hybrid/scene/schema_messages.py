@@ -305,7 +305,8 @@ def _elsewhere(root: type[Table], key: str) -> str:
     called = [path for path in every if path.rpartition(".")[2] == key]
     described = [path for path, text in every.items() if len(key) > 1 and speaks_of(text, key)]
     found = sorted(called or described, key=lambda path: path.count("."))
-    return f"did you mean {' or '.join(found[:2])}?" if found else ""
+    shown = [path if "." in path else f"{path} at the top of the file" for path in found[:2]]
+    return f"did you mean {' or '.join(shown)}?" if found else ""
 
 
 def _named(name: str, own: FieldInfo) -> str:

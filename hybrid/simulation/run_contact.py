@@ -116,7 +116,7 @@ class RunContact(Part):
     def fit_lines(self) -> None:
         """Contact of the lines as they are, of each with itself and of all, goes on with what there was."""
         run = self._run
-        self._note_meetings(self.shared)
+        self._note_meetings()
         own = {line.number: line.contact for line in run.lines if line.shares and line.contact is not None}
         contacts, shared = [line.touch_itself(run.t) for line in run.lines], shared_of(run.model, rubs=True)
         if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
@@ -166,6 +166,7 @@ class RunContact(Part):
         """Contact begins of lines that are near themselves, or each other, at the start."""
         run = self._run
         if not run.moves:
+            self.shared = run.solver.shared  # of the search
             self._watch_lines()
             self._find_overlaps()
             return
@@ -178,7 +179,7 @@ class RunContact(Part):
             begun = True
         if begun:
             run.balance()
-        self._note_meetings(run.solver.shared)
+        self._note_meetings()
 
     # --- checkpoints ----------------------------------------------------------------------------------
 
@@ -378,16 +379,16 @@ class RunContact(Part):
 
     def log(self, rows: Floats, cpu: Floats) -> None:
         """Tell which lines have met in these steps."""
-        self._note_meetings(self._run.solver.shared)
+        self._note_meetings()
 
     def finish(self, status: str) -> None:
         """Likewise in an equilibrium."""
-        self._note_meetings(self._run.solver.shared)
+        self._note_meetings()
 
-    def _note_meetings(self, shared: SharedContact | None) -> None:
+    def _note_meetings(self) -> None:
         """An event for every two lines that have met, with contact or without, when they do first."""
         run = self._run
-        for a, c, t, s, other in sorted(shared.met() if shared is not None else (), key=lambda x: x[2]):
+        for a, c, t, s, other in sorted(self.shared.met() if self.shared is not None else (), key=lambda x: x[2]):
             if (a, c) in self._met:
                 continue
             self._met.add((a, c))

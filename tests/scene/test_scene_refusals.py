@@ -157,6 +157,7 @@ CASES = {
     "polyline of a point": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0]]", "initial.points", "at least 2"),
     # --- what engineers write
     "EI": (SUSPENSION, BENDING, f"{BENDING}\n      §EI: 1", "cable.sections[0].EI", "did you mean bending_stiffness (N"),
+    "a table of the top, lower down": (SUSPENSION, MASS, f"{MASS}\n      §mesh: {{cells: 9}}", "cable.sections[0].mesh", "did you mean mesh at the top of the file?"),
     "velocity": (SUSPENSION, "{density: 1.0}", "{density: 1.0, §velocity: [1, 0, 0]}", "environment.fluid.velocity", "did you mean current: {velocity: [x, y, z]}?"),
     "wind, one table up": (SUSPENSION, "{density: 1.0}", "{density: 1.0}\n  §wind: [1, 0, 0]", "environment.wind", "fluid: {density: ...}"),
     "fixed": (SUSPENSION, PINNED, "{kind: §fixed, position: [0, 0, 0]}", "ends.start.kind", "did you mean pinned or clamped?"),

@@ -178,6 +178,21 @@ def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, monkeypatch: pytest.
     assert reached == ["first", "second"]
 
 
+def test_a_run_that_is_ended_before_it_has_a_solver_leaves_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by a second signal while kernels are compiled."""
+
+    def compiled(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hybrid.simulation.run.Run.make_solver", compiled)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(WIRE, tmp_path / "run.h5")
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "interrupted" and len(result.times) == 0
+
+
 # --- The process that compiles beside the first run ---
 
 
